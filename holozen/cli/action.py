@@ -134,19 +134,21 @@ class GoalRequest:
             raise Failure(f"{self._key}: the goal was rejected: {reason}")
         identity = bytes(self._id["uuid"]).hex()
         self._print({"goal_id": identity, "accepted": True}, f"Goal accepted with ID: {identity}")
-        asked = {"goal_id": self._id}
-        gone = threading.Event()
-        result = background(
-            lambda: wait_for_result(self._bus, self._key, json.dumps(asked).encode(), JSON, gone.is_set)
-        )
+        gone, ended = threading.Event(), threading.Event()
+
+        def wait() -> Any:
+            try:
+                asked = json.dumps({"goal_id": self._id}).encode()
+                return wait_for_result(self._bus, self._key, asked, JSON, gone.is_set)
+            finally:
+                ended.set()
+
         try:
-            return self._follow(result, stop)
+            return self._follow(background(wait), ended, stop)
         finally:
             gone.set()
 
-    def _follow(self, result: Callable[[], Any], stop: threading.Event) -> int:
-        ended = threading.Event()
-        threading.Thread(target=_set_after, args=(result, ended), daemon=True).start()
+    def _follow(self, result: Callable[[], Any], ended: threading.Event, stop: threading.Event) -> int:
         while not ended.is_set() and not stop.is_set():
             self._print_feedback()
             stop.wait(POLL)
@@ -187,14 +189,6 @@ class GoalRequest:
 
     def _print(self, value: dict[str, Any], text: str) -> None:
         print(json.dumps(value) if self._json else text, flush=True)
-
-
-def _set_after(work: Callable[[], object], done: threading.Event) -> None:
-    try:
-        work()
-    except BusError:  # raised again where the result is read
-        pass
-    done.set()
 
 
 def _send_arguments(parser: argparse.ArgumentParser) -> None:

@@ -111,14 +111,12 @@ class Printer:
         self._count = self._undecoded = self._fieldless = 0
         self._path = self._passes = None
         self.stopped: Any = None  # the last message that the filter rejected
-        if args.field:
+        if args.field or args.filter:
             from holozen.cli import fields
 
-            self._path, self._pick = fields.path(args.field), fields.pick
-        if args.filter:
-            from holozen.cli import fields
-
-            self._passes = fields.compiled(args.filter)
+            self._pick = fields.pick
+            self._path = fields.path(args.field) if args.field else None
+            self._passes = fields.compiled(args.filter) if args.filter else None
         self._short = args.truncate_length or args.no_arr or args.no_str
 
     def show(self, sample: Sample, value: Any) -> bool:

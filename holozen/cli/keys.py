@@ -31,19 +31,33 @@ class Topic:
         self.publishers = sum(end.kind == "pub" for end in ends)
         self.subscriptions = sum(end.kind == "sub" for end in ends)
 
-    def line(self, counted: str, number: int) -> str:
-        """The line of `list -v`."""
-        return f" * {self.key} [{', '.join(self.types) or 'unknown'}] {number} {counted}{'s' * (number != 1)}"
+    @property
+    def typed(self) -> str:
+        """Its key and types."""
+        return f"{self.key} [{', '.join(self.types) or 'unknown'}]"
+
+
+def by_key(endpoints: list[Endpoint], *kinds: str) -> dict[str, list[Endpoint]]:
+    """Key -> its endpoints of these kinds, by sorted keys."""
+    found: dict[str, list[Endpoint]] = {}
+    for end in sorted(endpoints):
+        if end.kind in kinds:
+            found.setdefault(end.key, []).append(end)
+    return found
 
 
 def topics(endpoints: list[Endpoint]) -> list[Topic]:
     """The keys that nodes read or write, sorted; without key expressions and keys that only tools such as echo read."""
-    ends: dict[str, list[Endpoint]] = {}
-    for end in endpoints:
-        if end.kind in ("pub", "sub") and "*" not in end.key:
-            ends.setdefault(end.key, []).append(end)
-    found = (Topic(key, its) for key, its in sorted(ends.items()))
+    found = [Topic(key, ends) for key, ends in by_key(endpoints, "pub", "sub").items() if "*" not in key]
     return [topic for topic in found if topic.types or topic.publishers]
+
+
+def print_rows(args: argparse.Namespace, rows: list[tuple[dict[str, Any], str]]) -> None:
+    """Print each row, as JSON or as text, or with -c only their number."""
+    if getattr(args, "count", False):
+        rows = [({"count": len(rows)}, str(len(rows)))]
+    for row, text in rows:
+        print(json.dumps(row) if args.json else printable(text))
 
 
 def print_list(
@@ -51,11 +65,8 @@ def print_list(
 ) -> int:
     """Print each (key, type) once, or with -c only their number; `ends` are all endpoints at `where`."""
     found = sorted(set(rows))
-    if args.count:
-        print(json.dumps({"count": len(found)}) if args.json else len(found))
-    for key, kind in found if not args.count else ():
-        shown = f"{key} [{kind}]" if args.show_types else key
-        print(json.dumps({"key": key, "type": kind}) if args.json else printable(shown))
+    shown = "{} [{}]" if args.show_types else "{}"
+    print_rows(args, [({"key": key, "type": kind}, shown.format(key, kind)) for key, kind in found])
     if not found:
         report(none_found(f"{noun}s", ends, where))
     return 0
@@ -65,19 +76,14 @@ def print_types(args: argparse.Namespace, types: Iterable[str], known: Iterable[
     """Print the types of a key. Raises Failure if there are none. `known` are the keys at `where`."""
     if not (types := sorted(types)):
         raise Failure(unknown(args.key, sorted(known), where))
-    for name in types:
-        print(json.dumps({"key": args.key, "type": name}) if args.json else printable(name))
+    print_rows(args, [({"key": args.key, "type": name}, name) for name in types])
     return 0
 
 
 def print_keys_of(args: argparse.Namespace, types: Mapping[str, Iterable[str]]) -> int:
     """Print the keys of a type. Raises Failure if there are none. `types`: key -> its types."""
     keys = sorted(key for key, its in types.items() if any(f"/{name}".endswith(f"/{args.type}") for name in its))
-    if getattr(args, "count", False):
-        print(json.dumps({"count": len(keys)}) if args.json else len(keys))
-    else:
-        for name in keys:
-            print(json.dumps({"key": name, "type": args.type}) if args.json else printable(name))
+    print_rows(args, [({"key": key, "type": args.type}, key) for key in keys])
     if not keys:
         known = sorted({name for its in types.values() for name in its})
         what = f"{args.verb.partition(' ')[0]} of type {args.type!r}{suggest(args.type, known)}"
@@ -108,15 +114,6 @@ def is_hidden(key: str) -> bool:
 # Services.
 
 
-def _served(ends: list[Endpoint]) -> dict[str, list[Endpoint]]:
-    """Key -> the servers of that service."""
-    found: dict[str, list[Endpoint]] = {}
-    for end in ends:
-        if end.kind == "srv":
-            found.setdefault(end.key, []).append(end)
-    return found
-
-
 def list_services(args: argparse.Namespace, bus: Node) -> int:
     """Print each service key once."""
     ends = bus.endpoints()
@@ -126,18 +123,19 @@ def list_services(args: argparse.Namespace, bus: Node) -> int:
 
 def service_type(args: argparse.Namespace, bus: Node) -> int:
     """Print a service's type. Raises Failure if it has no server."""
-    served = _served(bus.endpoints())
+    served = by_key(bus.endpoints(), "srv")
     return print_types(args, {end.type for end in served.get(args.key, ())}, served, bus.where)
 
 
 def find_services(args: argparse.Namespace, bus: Node) -> int:
     """Print the keys of a type. Raises Failure if there are none."""
-    return print_keys_of(args, {key: [end.type for end in ends] for key, ends in _served(bus.endpoints()).items()})
+    served = by_key(bus.endpoints(), "srv")
+    return print_keys_of(args, {key: [end.type for end in ends] for key, ends in served.items()})
 
 
 def service_info(args: argparse.Namespace, bus: Node) -> int:
     """Print a service's type and servers. Raises Failure if it has none."""
-    served = _served(bus.endpoints())
+    served = by_key(bus.endpoints(), "srv")
     if not (servers := served.get(args.key)):
         raise Failure(unknown(args.key, sorted(served), bus.where))
     return print_sides(args, [end.type for end in servers], {"servers": ("Services count", servers)})
@@ -160,31 +158,22 @@ def list_topics(args: argparse.Namespace, bus: Node) -> int:
     found = topics(ends)
     found += [Topic(name, []) for name in sorted(heard - {topic.key for topic in found})]
     found = [topic for topic in found if args.hidden or not is_hidden(topic.key)]
-    if args.count:
-        print(json.dumps({"count": len(found)}) if args.json else len(found))
-    elif args.json:
-        for topic in found:
-            print(json.dumps(vars(topic)))
-    elif args.verbose:
+    if args.verbose and not (args.count or args.json):
         _print_verbose(found)
     else:
-        for topic in found:
-            shown = f"{topic.key} [{', '.join(topic.types) or 'unknown'}]" if args.show_types else topic.key
-            print(printable(shown))
+        print_rows(args, [(vars(topic), topic.typed if args.show_types else topic.key) for topic in found])
     if not found:
         report(none_found("topics", ends, bus.where) + hint)
     return 0
 
 
 def _print_verbose(found: list[Topic]) -> None:
-    print("Published topics:")
-    for topic in found:
-        if topic.publishers or not topic.subscriptions:
-            print(printable(topic.line("publisher", topic.publishers)))
-    print("\nSubscribed topics:")
-    for topic in found:
-        if topic.subscriptions:
-            print(printable(topic.line("subscriber", topic.subscriptions)))
+    published = [(topic, topic.publishers) for topic in found if topic.publishers or not topic.subscriptions]
+    subscribed = [(topic, topic.subscriptions) for topic in found if topic.subscriptions]
+    for title, counted, rows in (("Published", "publisher", published), ("\nSubscribed", "subscriber", subscribed)):
+        print(f"{title} topics:")
+        for topic, number in rows:
+            print(printable(f" * {topic.typed} {number} {counted}{'s' * (number != 1)}"))
 
 
 def topic_type(args: argparse.Namespace, bus: Node) -> int:
@@ -262,43 +251,38 @@ def _status(bus: Node, name: str, endpoints: list[Endpoint]) -> Row:
 
 
 def _add_status(publishers: list[Row], status: Row) -> None:
-    """Add the sim's status of each source to its publisher; a source without a token becomes a row of its own."""
-    by_source = {row["source"]: row for row in publishers}
-    for source in _sources(status):
-        row = by_source.get(source["source"])
-        if row is None:
-            publishers.append(row := {"node": source["source"], "session": "", "type": "", "source": source["source"]})
-        row |= {name: source[name] for name in ("priority", "rate", "obeyed", "held")}
+    """Add the sim's status of each source to its publisher."""
+    sources = status.get("sources")
+    for source in sources if isinstance(sources, list) else ():  # the status is not validated yet
+        if isinstance(source, dict) and all(isinstance(source.get(name), kind) for name, kind in SOURCE.items()):
+            row = _row_of(publishers, source["source"])
+            row |= {name: source[name] for name in ("priority", "rate", "obeyed", "held")}
 
 
-def _sources(status: Row) -> list[Row]:
-    """The well-formed sources of a status, which is not validated yet."""
-    found = status.get("sources")
-    rows = [row for row in found if isinstance(row, dict)] if isinstance(found, list) else []
-    return [row for row in rows if all(isinstance(row.get(name), kind) for name, kind in SOURCE.items())]
-
-
-def _listen(bus: Node, name: str) -> dict[str, list[Sample]]:
-    """The samples of a key by source, received within LISTEN seconds or until there are ENOUGH."""
-    heard: dict[str, list[Sample]] = {}
+def _listen(bus: Node, name: str) -> dict[str, Sample]:
+    """The last sample of each source of a key, received within LISTEN seconds or until there are ENOUGH."""
+    heard: dict[str, Sample] = {}
     subscriber, deadline, count = bus.subscribe_raw(name), time.monotonic() + LISTEN, 0
     while time.monotonic() < deadline and count < ENOUGH:
         if (sample := subscriber.try_recv()) is None:
             time.sleep(LOOK)
             continue
-        heard.setdefault(sample.source, []).append(sample)
+        heard[sample.source] = sample
         count += 1
     return heard
 
 
-def _add_heard(publishers: list[Row], heard: dict[str, list[Sample]]) -> None:
-    by_source = {row["source"]: row for row in publishers}
-    for source, samples in heard.items():
-        name = source or "anonymous"
-        row = by_source.get(source)
-        if row is None:
-            publishers.append(row := {"node": name, "session": "", "type": "", "source": name})
-        last = samples[-1]
+def _row_of(publishers: list[Row], source: str) -> Row:
+    """The row of a source; one without a token gets a new one."""
+    row = next((row for row in publishers if row["source"] == source), None)
+    if row is None:
+        publishers.append(row := {"node": source, "session": "", "type": "", "source": source})
+    return row
+
+
+def _add_heard(publishers: list[Row], heard: dict[str, Sample]) -> None:
+    for source, last in heard.items():
+        row = _row_of(publishers, source or "anonymous")
         row["type"] = row["type"] or type_in(last.encoding)
         congestion, express = last.delivery
         row |= {"priority": last.priority, "encoding": last.encoding, "congestion": congestion, "express": express}
@@ -308,7 +292,7 @@ def _add_foreign(publishers: list[Row], bus: Node, name: str) -> None:
     """Add the node without a token that publishes a key or answers queries for it, if there is one."""
     if found := foreign_sample(bus, name):
         sample, answered = found
-        _add_heard(publishers, {sample.source: [sample]})
+        _add_heard(publishers, {sample.source: sample})
         publishers[-1]["node"] += ", which answers queries" * answered
 
 

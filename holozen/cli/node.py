@@ -7,6 +7,7 @@ import json
 from functools import partial
 
 from holozen.cli.hints import is_any, no_nodes
+from holozen.cli.keys import print_rows
 from holozen.cli.verb import Noun, Verb, add_count, argument, by_name, open_bus
 from holozen.console import Failure, printable, report
 from holozen.flags import key
@@ -21,12 +22,8 @@ def list_nodes(args: argparse.Namespace) -> int:
     with open_bus(args) as bus:
         endpoints = bus.endpoints()
     nodes = sorted((end.node, end.session) for end in endpoints if end.kind == "node")
-    if args.count:
-        print(json.dumps({"count": len(nodes)}) if args.json else len(nodes))
-        return 0
-    for name, session in nodes:
-        print(json.dumps({"node": name, "session": session}) if args.json else printable(name))
-    if not nodes:
+    print_rows(args, [({"node": name, "session": session}, name) for name, session in nodes])
+    if not nodes and not args.count:
         report(no_nodes(bus.where))
     return 0
 
@@ -66,17 +63,13 @@ def graph(args: argparse.Namespace) -> int:
     with open_bus(args) as bus:
         found = [end for end in bus.endpoints() if not is_any(end)]
     ends = [end for end in found if end.kind != "node"]
-    _print_graph(args, ends)
-    if not found:
-        report(no_nodes(bus.where))
-    return 0
-
-
-def _print_graph(args: argparse.Namespace, ends: list[Endpoint]) -> None:
-    for row in dot(ends) if args.dot else arrows(ends) if not args.json else []:
+    for row in dot(ends) if args.dot else [] if args.json else arrows(ends):
         print(printable(row))
     for end in ends if args.json else []:
         print(json.dumps(end._asdict()))
+    if not found:
+        report(no_nodes(bus.where))
+    return 0
 
 
 def arrows(ends: list[Endpoint]) -> list[str]:

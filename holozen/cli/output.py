@@ -51,17 +51,14 @@ class Reader:
             return value
         try:
             if kind := self._given or schema or usual or self._announced_type(sample.key, bus):
-                return self._cdr(kind, sample.payload, bus)
+                from holozen.messages import cdr
+
+                return cdr.read(self._interface(kind, bus.definition), sample.payload)
             self.why = "for CDR give the type: --type T"
         except ValueError as error:  # bytes of another type, or a type that is not known here
             other = f", its encoding is {schema}" if schema not in ("", self._given) else ""
             self.why = f"{error}; --type is wrong, or the bytes are{other}" if self._given else str(error)
         return hex_dump(sample.payload, sample.encoding)
-
-    def _cdr(self, kind: str, payload: bytes, bus: Node) -> Any:
-        from holozen.messages import cdr
-
-        return cdr.read(self._interface(kind, bus.definition), payload)
 
     def _interface(self, name: str, define: Callable[[str], str] = lambda _: "") -> Any:
         """The definition of a type; an unknown one is learned from its publisher."""

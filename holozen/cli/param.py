@@ -13,7 +13,7 @@ import argparse
 import json
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from holozen.background import background
@@ -47,7 +47,6 @@ class Nodes:
         looking = background(bus.endpoints)
         with deferred_interrupt():  # while nodes are discovered
             from holozen.messages import codec, rcl_interfaces  # noqa: F401
-
         for endpoint in looking():
             if endpoint.kind == "srv" and endpoint.key.endswith(LIST):
                 self.sessions.setdefault(endpoint.key.removesuffix(LIST), []).append(endpoint.session[:6])
@@ -70,39 +69,32 @@ class Nodes:
 
     def names(self, node: str, prefixes: list[str] = []) -> list[str]:
         """The parameters of a node, sorted."""
-        from holozen.messages import rcl_interfaces as r
-
-        request = r.ListParametersRequest(prefixes)
-        return sorted(self._call(node, "list_parameters", request, r.ListParametersReply).result.names)
+        return sorted(self._call(node, "list_parameters", prefixes).result.names)
 
     def values(self, node: str, names: list[str]) -> list[r.ParameterValue]:
         """The values of the named parameters."""
-        from holozen.messages import rcl_interfaces as r
-
-        reply = self._call(node, "get_parameters", r.GetParametersRequest(names), r.GetParametersReply)
-        return _as_many(reply.values, names, node)
+        return _as_many(self._call(node, "get_parameters", names).values, names, node)
 
     def descriptors(self, node: str, names: list[str]) -> list[r.ParameterDescriptor]:
         """The descriptors of the named parameters."""
-        from holozen.messages import rcl_interfaces as r
-
-        request = r.DescribeParametersRequest(names)
-        reply = self._call(node, "describe_parameters", request, r.DescribeParametersReply)
-        return _as_many(reply.descriptors, names, node)
+        return _as_many(self._call(node, "describe_parameters", names).descriptors, names, node)
 
     def set(self, node: str, wanted: dict[str, Any]) -> list[r.SetParametersResult]:
         """Set parameters, all or none of them."""
         from holozen.messages import rcl_interfaces as r
 
         parameters = [r.Parameter(name, r.ParameterValue.of(value)) for name, value in wanted.items()]
-        reply = self._call(node, "set_parameters", r.SetParametersRequest(parameters), r.SetParametersReply)
-        return _as_many(reply.results, parameters, node)
+        return _as_many(self._call(node, "set_parameters", parameters).results, parameters, node)
 
-    def _call(self, node: str, verb: str, request: Any, reply: type[Any]) -> Any:
+    def _call(self, node: str, verb: str, *fields: Any) -> Any:
+        """The reply of a node's service to a request with these fields."""
+        from holozen.messages import named
         from holozen.messages.codec import CodecError
 
+        kind = f"rcl_interfaces/srv/{verb.title().replace('_', '')}"
+        request, reply = named(f"{kind}_Request"), named(f"{kind}_Response")
         try:
-            return self._bus.call(f"{node}/{verb}", request, reply, self._timeout)
+            return self._bus.call(f"{node}/{verb}", request(*fields), reply, self._timeout)
         except CodecError as error:
             raise BusError(str(error)) from None
 
@@ -120,23 +112,21 @@ def _as_many(found: list[Any], asked: list[Any], node: str) -> list[Any]:
 
 def list_names(args: argparse.Namespace) -> int:
     """Print the names of one node's parameters, or of all nodes', each node once."""
-    with open_bus(args) as bus:
-        return _list_names(args, Nodes(bus, args.timeout))
-
-
-def _list_names(args: argparse.Namespace, nodes: Nodes) -> int:
     code = 0
-    for node in [nodes.only(args.node)] if args.node else sorted(nodes.sessions):
-        if len(nodes.sessions[node]) > 1:
-            report(f"holozen {args.verb}: {nodes.twins(node)}; only one of them is shown: end the others")
-            code = 1
-        names = nodes.names(node, args.param_prefixes)
-        kinds = _kinds(nodes, node, names) if args.param_type or args.json else {}
-        if not args.node and not args.json:
-            print(printable(f"{node}:"))
-        for name in names:
-            row = {"node": node, "name": name, "type": kinds.get(name)}
-            _show(args, row, f"  {name}" + (f" (type: {kinds[name]})" if args.param_type else ""))
+    with open_bus(args) as bus:
+        nodes = Nodes(bus, args.timeout)
+        for node in [nodes.only(args.node)] if args.node else sorted(nodes.sessions):
+            if len(nodes.sessions[node]) > 1:
+                report(f"holozen {args.verb}: {nodes.twins(node)}; only one of them is shown: end the others")
+                code = 1
+            names = nodes.names(node, args.param_prefixes)
+            described = nodes.descriptors(node, names) if names and (args.param_type or args.json) else []
+            kinds = {row.name: _word(row.type) for row in described}
+            if not args.node and not args.json:
+                print(printable(f"{node}:"))
+            for name in names:
+                row = {"node": node, "name": name, "type": kinds.get(name)}
+                _show(args, row, f"  {name}" + (f" (type: {kinds[name]})" if args.param_type else ""))
     if not nodes.sessions:
         report("no parameters: no node has any; `holozen up` starts a robot")
     return code
@@ -145,10 +135,9 @@ def _list_names(args: argparse.Namespace, nodes: Nodes) -> int:
 def get(args: argparse.Namespace, nodes: Nodes, node: str) -> int:
     """Print one value."""
     (value,) = nodes.values(node, [args.name])
-    text = _text(value.plain())
-    _show(
-        args, _row(node, args.name, value), text if args.hide_type else f"{_word(value.type).title()} value is: {text}"
-    )
+    plain = value.plain()
+    text = "" if args.hide_type else f"{_word(value.type).title()} value is: "
+    _show(args, _row(node, args.name, value), text + (plain if isinstance(plain, str) else json.dumps(plain)))
     return 0
 
 
@@ -214,10 +203,6 @@ def dump(args: argparse.Namespace, nodes: Nodes, node: str) -> int:
     return 0
 
 
-def _kinds(nodes: Nodes, node: str, names: list[str]) -> dict[str, str]:
-    return {row.name: _word(row.type) for row in nodes.descriptors(node, names)} if names else {}
-
-
 def _row(node: str, name: str, value: r.ParameterValue) -> dict[str, Any]:
     return {"node": node, "name": name, "type": _word(value.type), "value": value.plain()}
 
@@ -226,10 +211,6 @@ def _word(kind: int) -> str:
     from holozen.messages.rcl_interfaces import WORDS
 
     return WORDS[kind] if kind < len(WORDS) else "unknown"
-
-
-def _text(value: Any) -> str:
-    return value if isinstance(value, str) else json.dumps(value)
 
 
 def _show(args: argparse.Namespace, row: dict[str, Any], *lines: str) -> None:
@@ -286,13 +267,10 @@ def read_file(path: str, node: str, wildcards: bool = True) -> dict[str, Value]:
     if not found:
         raise BusError(f"{path}: it has no parameter for the node {node!r}")
     for name, value in found.items():
-        if not all(math.isfinite(each) for each in _listed(value) if isinstance(each, float)):
+        numbers = [each for each in (value if isinstance(value, list) else [value]) if isinstance(each, float)]
+        if not all(map(math.isfinite, numbers)):
             raise BusError(f"{path}: {name} is {value}; write a finite number")
     return found
-
-
-def _listed(value: Value) -> Sequence[Word]:
-    return value if isinstance(value, list) else [value]
 
 
 def _written_name(name: str) -> str:

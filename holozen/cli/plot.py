@@ -118,15 +118,9 @@ def _print_rows(lines: Lines, args: argparse.Namespace, stop: threading.Event) -
 
 def _draw(lines: Lines, args: argparse.Namespace, stop: threading.Event, waiting: str) -> None:
     """Draw until interrupted. `waiting` is shown until there is a first point: the screen hides earlier lines."""
-    begun = time.monotonic()
     picture: list[str] = []
     with Screen(args.once, args.ascii) as screen:
-        due = begun + (args.window if args.once else 0.0)
-        while not stop.wait(TICK):
-            lines.take()
-            if (now := time.monotonic()) < due:
-                continue
-            due = now + screen.every
+        for now in _due(screen, lines.take, args.window if args.once else 0.0, stop):
             picture = [printable(line) for line in panels(lines.points, now, args.window, screen.size, screen.ascii)]
             if args.once:
                 break
@@ -135,6 +129,16 @@ def _draw(lines: Lines, args: argparse.Namespace, stop: threading.Event, waiting
             screen.show(picture)
     if args.once:
         print("\n".join(line.rstrip() for line in picture), flush=True)
+
+
+def _due(screen: Screen, take: Callable[[], object], first: float, stop: threading.Event) -> Iterator[float]:
+    """The times at which to draw, the first after `first` seconds, until `stop` is set. `take` is called in between."""
+    due = time.monotonic() + first
+    while not stop.wait(TICK):
+        take()
+        if (now := time.monotonic()) >= due:
+            due = now + screen.every
+            yield now
 
 
 def draw_map(args: argparse.Namespace) -> int:
@@ -151,13 +155,8 @@ def draw_map(args: argparse.Namespace) -> int:
 
 def _watch(watcher: Watcher, args: argparse.Namespace, stop: threading.Event) -> int:
     single = args.once or args.json
-    due = time.monotonic() + (args.wait if single else 0.0)
     with Screen(single, args.ascii) as screen:
-        while not stop.wait(TICK):
-            watcher.take()
-            if (now := time.monotonic()) < due:
-                continue
-            due = now + screen.every
+        for _ in _due(screen, watcher.take, args.wait if single else 0.0, stop):
             plane = watcher.plane()
             if args.json:
                 print(json.dumps(_plane_as_json(plane)), flush=True)

@@ -276,7 +276,9 @@ class Delays:
         if abs(wall - stamp) < NEAR:
             self.by.add("the wall clock of this machine")
             return wall - stamp
-        self._start_following_clock()
+        if self._clock is None:
+            self._clock = threading.Thread(target=self._follow, args=(self._bus.subscribe_raw("clock"),), daemon=True)
+            self._clock.start()
         sim_time = self._sim.time(now)
         if sim_time is None:
             self.clockless += 1
@@ -290,11 +292,6 @@ class Delays:
             return f"{self.unstamped} messages have no header.stamp, and so no age"
         text = f"{self.clockless} messages have stamps by another clock than this machine's, and nothing comes on clock"
         return text if self.clockless else ""
-
-    def _start_following_clock(self) -> None:
-        if self._clock is None:
-            self._clock = threading.Thread(target=self._follow, args=(self._bus.subscribe_raw("clock"),), daemon=True)
-            self._clock.start()
 
     def _follow(self, subscriber: RawSubscriber) -> None:
         for sample in _received(subscriber):

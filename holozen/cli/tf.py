@@ -122,13 +122,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("source", type=_frame, metavar="SOURCE", help="the frame in which the pose is given, such as odom")
     add("target", type=_frame, metavar="TARGET", help="the frame whose pose it is, such as base_link")
-    add(
-        "--robot",
-        type=robot,
-        default="",
-        metavar="NAME",
-        help="the robot whose keys to use (default: those at the root)",
-    )
+    add("--robot", type=robot, default="", metavar="NAME",
+        help="the robot whose keys to use (default: those at the root)")  # fmt: skip
     add("-r", "--rate", type=number(0.01, 100, "Hz"), default=1.0, metavar="HZ", help="poses per second (default: 1)")
     add("-1", "--once", action="store_true", help="end after the first one")
     add("--timeout", type=number(0.01, 1e6, "s"), metavar="S", help="exit code 1 after S seconds without one")

@@ -7,7 +7,7 @@ import importlib
 import re
 import threading
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from holozen.flags import Parser, count, key, number
 from holozen.process import deferred_interrupt
@@ -56,7 +56,7 @@ _VALUES: dict[str, Callable[[str], object]] = {"S": number(0, 1e9, "s"), "N": co
 _TYPE = re.compile(r"\w+/((msg|srv|action)/)?\w+")
 
 
-class Verb:
+class Verb(NamedTuple):
     """A verb, such as `topic list` or `plot`.
 
     `about` is its line of help, `arguments` adds its flags to a parser, `run` does the work and returns the exit code.
@@ -64,28 +64,22 @@ class Verb:
     has the flags of a connection. The parsed flags also hold its name as `verb`, and the parser's method `error`.
     """
 
-    def __init__(
-        self,
-        name: str,
-        about: str,
-        example: str,
-        arguments: Callable[[argparse.ArgumentParser], object],
-        run: Callable[[argparse.Namespace], int],
-        json: str | None = JSON,
-        notes: str = "",
-        usage: str | None = None,
-        bus: bool = True,
-    ) -> None:
-        self.name, self.about, self._example = name, about, example
-        self._arguments, self._run, self._json = arguments, run, json
-        self._notes, self._usage, self._bus = notes, usage, bus
+    name: str
+    about: str
+    example: str
+    arguments: Callable[[argparse.ArgumentParser], object]
+    run: Callable[[argparse.Namespace], int]
+    json: str | None = JSON
+    notes: str = ""
+    usage: str | None = None
+    bus: bool = True
 
     def main(self, argv: list[str]) -> int:
         """Run it with its part of the command line; returns the exit code."""
         parser = self.parser()
         if any(action.nargs == argparse.REMAINDER for action in parser._actions):
-            return self._run(parser.parse_args(argv))
-        return self._run(parser.parse_intermixed_args(argv))  # flags may stand anywhere, also before a last value
+            return self.run(parser.parse_args(argv))
+        return self.run(parser.parse_intermixed_args(argv))  # flags may stand anywhere, also before a last value
 
     def parser(self) -> Parser:
         """A parser for this verb alone."""
@@ -96,17 +90,17 @@ class Verb:
     def options(self) -> dict[str, Any]:
         """The keyword arguments with which to create its parser."""
         prog = f"holozen {self.name}"
-        example = f"example: {prog} {self._example}".rstrip()
-        epilog = f"{self._notes}\n\n{example}" if self._notes else example
-        return {"prog": prog, "usage": self._usage, "description": self.about, "epilog": epilog}
+        example = f"example: {prog} {self.example}".rstrip()
+        epilog = f"{self.notes}\n\n{example}" if self.notes else example
+        return {"prog": prog, "usage": self.usage, "description": self.about, "epilog": epilog}
 
     def fill(self, parser: argparse.ArgumentParser) -> None:
         """Add all its flags to a parser."""
         parser.set_defaults(verb=self.name, error=parser.error)
-        self._arguments(parser)
-        if self._json:
-            parser.add_argument("--json", action="store_true", help=self._json)
-        if self._bus:
+        self.arguments(parser)
+        if self.json:
+            parser.add_argument("--json", action="store_true", help=self.json)
+        if self.bus:
             connection.add_arguments(parser)
         if self.name.partition(" ")[0] in ("topic", "service", "action", "node", "param"):
             _add_ros2_flags(parser, (*_EVERY, *_ROS2.get(self.name, ())))

@@ -17,18 +17,9 @@ if TYPE_CHECKING:
     from holozen.messages.definitions import Interface
 
 __all__ = [
-    "WIRES",
-    "CodecError",
-    "convert",
-    "decode",
-    "decoder",
-    "encode",
-    "encoding",
-    "form",
-    "transcoded",
-    "writer",
+    "WIRES", "CodecError", "convert", "decode", "decoder", "encode", "encoding", "form", "transcoded", "writer",
     "written",
-]
+]  # fmt: skip
 
 M = TypeVar("M", bound=Message)
 Makers = tuple[tuple[type[M], Callable[[Any], M]], ...]

@@ -125,9 +125,6 @@ class Interface:
         """The first part of the name."""
         return self.name.partition("/")[0]
 
-    def __repr__(self) -> str:
-        return f"<Interface {self.name}>"
-
 
 def element_size(field: Field) -> int:
     """The least number of bytes of one element of a field, without padding."""

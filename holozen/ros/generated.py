@@ -42,10 +42,8 @@ Check = Callable[[Any], Any]
 
 _construct = StructMeta.__call__  # constructs a message from values known to be valid
 _store = Struct.__setattr__
-MADE: dict[Interface, type["RosMessage"]] = {}
-_kinds: dict[tuple[Any, ...], type["RosMessage"]] = {}  # by content: another registry parses the same file again
-_services: dict[tuple[str, Any, Any], type["RosService"]] = {}
-_actions: dict[tuple[Any, ...], type["RosAction"]] = {}
+MADE: dict[Interface, Any] = {}
+_kinds: dict[tuple[Any, ...], Any] = {}  # by content: another registry parses the same file again
 _registry = Registry()
 _lock = threading.RLock()  # callbacks in several threads may ask first
 
@@ -96,28 +94,16 @@ class RosMessage(Message, metaclass=RosMeta):
         return _unpickled, (self.__interface__.name, [getattr(self, name) for name in self.__struct_fields__])
 
 
-class RosService:
-    """The base class of all generated services, which only name their two messages."""
+class RosInterface:
+    """The base class of all generated services and actions, which only name their messages. `Impl` of an action has
+    those that travel.
+    """
 
     ROS: ClassVar[str] = ""
-    Request: ClassVar[Any]
-    Response: ClassVar[Any]
 
     def __init__(self) -> None:
-        raise NotImplementedError(f"a service type has no instances; create a {type(self).__name__}.Request()")
-
-
-class RosAction:
-    """The base class of all generated actions, which only name their messages; `Impl` has those that travel."""
-
-    ROS: ClassVar[str] = ""
-    Goal: ClassVar[Any]
-    Result: ClassVar[Any]
-    Feedback: ClassVar[Any]
-    Impl: ClassVar[Any]
-
-    def __init__(self) -> None:
-        raise NotImplementedError(f"an action type has no instances; create a {type(self).__name__}.Goal()")
+        what, part = ("an action", "Goal") if hasattr(self, "Goal") else ("a service", "Request")
+        raise NotImplementedError(f"{what} type has no instances; create a {type(self).__name__}.{part}()")
 
 
 def use(registry: Registry) -> None:
@@ -133,52 +119,38 @@ def find(name: str) -> Any:
     Raises InterfaceError, with the closest name that exists.
     """
     with _lock:
-        interface = _registry.find(name)
-        return {"msg": make, "srv": make_service, "action": make_action}[interface.kind](interface)
+        return make(_registry.find(name))
 
 
-def make(interface: Interface) -> type[RosMessage]:
-    """The class of a message, one per definition. Raises InterfaceError for names that no class can have."""
+def make(interface: Interface) -> Any:
+    """The class of a message, a service or an action, one per definition. Raises InterfaceError for names that no class
+    can have.
+    """
     if interface not in MADE:
         nested = {field.name: make(field.nested) for field in interface.fields if field.nested}
+        parts = {part.name.rpartition("_")[2]: make(part) for part in interface.parts}
         described = ((*each[:6], nested.get(each.name)) for each in interface.fields)
-        key = (interface.name, repr(interface.constants), *((repr(words), kind) for *words, kind in described))
+        content = ((repr(words), kind) for *words, kind in described)
+        key = (interface.name, repr(interface.constants), *content, *parts.values())
         if key not in _kinds:
-            _kinds[key] = _make(interface, nested)
+            _kinds[key] = _message(interface, nested) if interface.kind == "msg" else _owner(interface, parts)
         MADE[interface] = _kinds[key]
     return MADE[interface]
 
 
-def make_service(interface: Interface) -> type[RosService]:
-    """The class of a service, one per definition. Raises InterfaceError."""
-    if not (interface.request and interface.response):
-        raise InterfaceError(f"{interface.name} is not a service")
-    request, response = make(interface.request), make(interface.response)
-    key = (interface.name, request, response)
-    if key not in _services:
-        names = {"__module__": _module(interface), "ROS": interface.name, "Request": request, "Response": response}
-        _services[key] = type(_last(interface), (RosService,), names)
-    return _services[key]
-
-
-def make_action(interface: Interface) -> type[RosAction]:
-    """The class of an action, one per definition. Raises InterfaceError."""
-    made = {part.name.rpartition("_")[2]: part for part in interface.parts}
-    kinds = {name: (make_service if part.kind == "srv" else make)(part) for name, part in made.items()}
-    key = (interface.name, *kinds.values())
-    if key not in _actions:
+def _owner(interface: Interface, parts: dict[str, Any]) -> type[RosInterface]:
+    """The class of a service or an action, from the classes of its parts."""
+    if interface.kind == "action":
         travels = {
-            "SendGoalService": kinds["SendGoal"], "GetResultService": kinds["GetResult"],
-            "FeedbackMessage": kinds["FeedbackMessage"], "CancelGoalService": find("action_msgs/srv/CancelGoal"),
+            "SendGoalService": parts.pop("SendGoal"), "GetResultService": parts.pop("GetResult"),
+            "FeedbackMessage": parts.pop("FeedbackMessage"), "CancelGoalService": find("action_msgs/srv/CancelGoal"),
             "GoalStatusMessage": find("action_msgs/msg/GoalStatusArray"),
         }  # fmt: skip
-        parts = {name: kinds[name] for name in ("Goal", "Result", "Feedback")}
-        names = {"__module__": _module(interface), "ROS": interface.name, "Impl": type("Impl", (), travels), **parts}
-        _actions[key] = type(_last(interface), (RosAction,), names)
-    return _actions[key]
+        parts["Impl"] = type("Impl", (), travels)
+    return type(_last(interface), (RosInterface,), {"__module__": _module(interface), "ROS": interface.name, **parts})
 
 
-def _make(interface: Interface, nested: dict[str, type[RosMessage]]) -> type[RosMessage]:
+def _message(interface: Interface, nested: dict[str, type[RosMessage]]) -> Any:
     for name in (*(field.name for field in interface.fields), *(each.name for each in interface.constants)):
         if keyword.iskeyword(name) or hasattr(RosMessage, name):
             raise InterfaceError(f"{interface.name}: {name!r} is reserved by Python or by all messages; rename it")
@@ -200,8 +172,7 @@ def _make(interface: Interface, nested: dict[str, type[RosMessage]]) -> type[Ros
     kind.__slots__ = [f"_{field.name}" for field in interface.fields]
     for constant in interface.constants:
         setattr(kind, constant.name, constant.value)
-    made: type[RosMessage] = kind
-    return made
+    return kind
 
 
 def _settle(owner: str, interface: Interface, nested: dict[str, type[RosMessage]]) -> Any:

@@ -55,15 +55,6 @@ def remove() -> None:
             del sys.modules[name]
 
 
-def reexported(module: str) -> dict[str, str]:
-    """Name -> the module that defines it, for the names that a module of ROS imports from others."""
-    found = {}
-    for name in REEXPORTS.get(module, ()):
-        messages = next((place for place, names in MESSAGES.items() if name in names), "")
-        found[name] = messages or _defined_in(name, "rclpy")
-    return found
-
-
 def explain(error: ModuleNotFoundError, line: str) -> str:
     """Why the package that a line of source imports interfaces from was not found, or what to do about any other module
     that is missing; empty where the error names it itself.
@@ -274,8 +265,9 @@ def _fill_library(module: ModuleType) -> None:
 
     def get(wanted: str) -> Any:
         if wanted in others:
-            value = module.__dict__[wanted] = getattr(import_module(reexported(name)[wanted]), wanted)
-            return value
+            messages = (place for place, names in MESSAGES.items() if wanted in names)
+            value = getattr(import_module(next(messages, "") or _defined_in(wanted, "rclpy")), wanted)
+            return module.__dict__.setdefault(wanted, value)
         if f"{name}.{wanted}" in MODULES:
             return import_module(f"{name}.{wanted}")
         if wanted.startswith("__"):  # tools that inspect all modules ask for these

@@ -78,18 +78,14 @@ def _innermost(trace: TracebackType | None) -> TracebackType | None:
 def _clean(error: BaseException, seen: set[int]) -> None:
     seen.add(id(error))
     error.__traceback__ = user_frames(error.__traceback__)
-    _rename(type(error))
+    kind = type(error)
+    if kind.__module__.startswith("holozen."):  # what ROS does not have is shown without a module
+        kind.__module__ = next((name for name, ours in MODULES.items() if ours == kind.__module__), "builtins")
     if isinstance(error, ModuleNotFoundError):
         _explain(error)
     for other in (error.__cause__, error.__context__):
         if other is not None and id(other) not in seen:
             _clean(other, seen)
-
-
-def _rename(kind: type) -> None:
-    """Show a class of ours under its name in ROS; what ROS does not have, without a module."""
-    if kind.__module__.startswith("holozen."):
-        kind.__module__ = next((name for name, ours in MODULES.items() if ours == kind.__module__), "builtins")
 
 
 def _explain(error: ModuleNotFoundError) -> None:

@@ -35,9 +35,7 @@ class LaunchDescription(LaunchDescriptionEntity):
         """Append an entity."""
         self.entities += checked([entity], here())
 
-    def add_action(self, action: Any) -> None:
-        """Append an action."""
-        self.entities += checked([action], here())
+    add_action = add_entity
 
 
 class Condition:

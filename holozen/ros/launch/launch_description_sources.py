@@ -31,12 +31,8 @@ class PythonLaunchDescriptionSource:
             raise LaunchError.of(error, self.place) from None
 
 
-class AnyLaunchDescriptionSource(PythonLaunchDescriptionSource):
-    """A launch file; only those in Python are supported here."""
-
-
-class FrontendLaunchDescriptionSource(PythonLaunchDescriptionSource):
-    """A launch file; only those in Python are supported here."""
+# Only launch files in Python are supported here.
+AnyLaunchDescriptionSource = FrontendLaunchDescriptionSource = PythonLaunchDescriptionSource
 
 
 def read(path: Path) -> LaunchDescription:

@@ -200,7 +200,7 @@ class LaunchService:
         if program.required:
             self.stop(f"{process.name} has ended, and everything here depends on it")
         elif program.respawn is not None:
-            self.after(program.respawn, [Restart(process.action, program)])
+            self.after(program.respawn, [OpaqueFunction(function=lambda _: self.start(process.action, program))])
 
     def _close(self, process: "Process") -> int:
         self._processes.remove(process)
@@ -229,17 +229,6 @@ class LaunchService:
             process.signal(signal.SIGKILL)
             report(f"launch: {process.name} did not end and was killed")
             self._close(process)
-
-
-class Restart(Action):
-    """Restarts a process that has ended."""
-
-    def __init__(self, action: Action, program: Program) -> None:
-        super().__init__()
-        self.action, self.program = action, program
-
-    def execute(self, context: LaunchContext) -> None:
-        context.runner.start(self.action, self.program)
 
 
 class Process:

@@ -211,9 +211,6 @@ class Clock(HelpfulAttributes):
 class ROSClock(Clock):
     """The clock of nodes: simulated time while that is active, else the system's. Simulated time starts at zero."""
 
-    def __new__(cls, **_options: Any) -> "ROSClock":
-        return object.__new__(cls)
-
     def __init__(self, **_options: Any) -> None:
         super().__init__(clock_type=ClockType.ROS_TIME)
         self._active, self._shown = False, 0

@@ -188,9 +188,7 @@ class RcutilsLogger(HelpfulAttributes):
         """Print a line about what may be wrong. Options are those of `log`."""
         return self.log(message, LoggingSeverity.WARN, **options)
 
-    def warn(self, message: object, **options: Any) -> bool:
-        """`warning`, by its older name."""
-        return self.log(message, LoggingSeverity.WARN, **options)
+    warn = warning
 
     def error(self, message: object, **options: Any) -> bool:
         """Print a line about what failed. Options are those of `log`."""

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Self, TypeVar
 from holozen.messages import Message
 from holozen.ros.catalog import HelpfulAttributes
 from holozen.ros.generated import find
-from holozen.ros.rclpy import arguments, names, parameter_service
+from holozen.ros.rclpy import arguments, names
 from holozen.ros.rclpy.arguments import Arguments
 from holozen.ros.rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
 from holozen.ros.rclpy.client import Client
@@ -30,6 +30,7 @@ from holozen.ros.rclpy.parameter import (
     PARAMETER_SEPARATOR_STRING,
     Callback,
     Parameter,
+    ParameterServices,
     ParameterStore,
     empty_descriptor,
     set_result,
@@ -184,7 +185,7 @@ class Node(HelpfulAttributes):
         if USE_SIM_TIME not in state.store.values:
             self.declare_parameter(USE_SIM_TIME, False)
         if start_parameter_services:
-            parameter_service.serve(self, state.full_name, state.store)
+            ParameterServices(self, state.full_name, state.store)
         state.time_source = TimeSource(self)
         state.time_source.attach_clock(state.clock)
 

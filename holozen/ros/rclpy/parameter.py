@@ -1,10 +1,11 @@
-"""Parameter: a name with a typed value, and the parameters of a node with their descriptors and callbacks."""
+"""Parameter: a name with a typed value, and the parameters of a node with their descriptors, callbacks and services."""
 
 import array
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from copy import deepcopy
 from enum import Enum
+from functools import partial
 from typing import Any
 
 from holozen.ros import parameter_yaml
@@ -16,8 +17,11 @@ from holozen.ros.rclpy.exceptions import (
     ParameterAlreadyDeclaredException,
     ParameterNotDeclaredException,
 )
-from holozen.ros.rclpy.names import text_of
+from holozen.ros.rclpy.names import join, key, text_of
+from holozen.ros.rclpy.qos import qos_profile_parameters
+from holozen.ros.rclpy.service import Refusal
 from holozen.suggest import article, shorten
+from holozen.transport.parameters import ELSE, MAX_NAMES, unknown
 
 __all__ = [
     "PARAMETER_SEPARATOR_STRING", "Parameter", "get_parameter_value", "parameter_dict_from_yaml_file",
@@ -368,3 +372,79 @@ def _name(callback: Callback) -> str:
 def set_result(reason: str) -> Any:
     """The SetParametersResult of a rejection with that reason, or of a success if it is empty."""
     return find("rcl_interfaces/msg/SetParametersResult")(successful=not reason, reason=reason)
+
+
+class ParameterServices:
+    """A node's parameter services, under ROS's names: `<node>/get_parameters` and so on. Answered while it is spun."""
+
+    def __init__(self, node: Any, full_name: str, store: ParameterStore) -> None:
+        self._node, self._key, self._store = node, key(full_name), store
+        answers = {
+            "describe_parameters": self._describe, "get_parameter_types": self._types, "get_parameters": self._get,
+            "set_parameters": self._set, "set_parameters_atomically": self._set_atomically,
+            # Last: once it is in the graph the others are as well.
+            "list_parameters": self._list,
+        }  # fmt: skip
+        for name, answer in answers.items():
+            kind = find(f"rcl_interfaces/srv/{name.title().replace('_', '')}")
+            callback = partial(self._checked, answer)
+            node.create_service(kind, join(full_name, name), callback, qos_profile=qos_profile_parameters)
+
+    def _checked(self, answer: Callable[[Any, Any], None], request: Any, response: Any) -> Any:
+        """Refuse requests with too many parameters or with unknown ones, and let `answer` fill in the response."""
+        requested: list[Any] = getattr(request, "names", None) or getattr(request, "parameters", [])
+        if len(requested) > MAX_NAMES:
+            raise Refusal(f"{len(requested)} parameters in one request; at most {MAX_NAMES}")
+        for name in getattr(request, "names", ()):
+            if reason := self._unknown(name):
+                raise Refusal(reason)
+        answer(request, response)
+        return response
+
+    def _unknown(self, name: str) -> str:
+        """The reason to refuse a parameter that the node neither has nor allows; empty for any other."""
+        is_allowed = name in self._store.values or self._store.allow_undeclared
+        return "" if is_allowed else unknown(self._key, name, self._store.values)
+
+    def _describe(self, request: Any, response: Any) -> None:
+        response.descriptors = self._node.describe_parameters(request.names)
+
+    def _types(self, request: Any, response: Any) -> None:
+        response.types = [kind.value for kind in self._node.get_parameter_types(request.names)]
+
+    def _get(self, request: Any, response: Any) -> None:
+        """A parameter without a value has the type NOT_SET."""
+        values = self._store.values
+        response.values = [(values.get(name) or Parameter(name)).get_parameter_value() for name in request.names]
+
+    def _list(self, request: Any, response: Any) -> None:
+        response.result = self._node.list_parameters(request.prefixes, request.depth)
+
+    def _set(self, request: Any, response: Any) -> None:
+        """Set all or none, as every holozen node does."""
+        reasons = self._rejections(request.parameters)
+        if not any(reasons):
+            reason = self._store.set([Parameter.from_parameter_msg(each) for each in request.parameters])
+            reasons = [reason, *[reason and ELSE] * len(reasons[1:])] if reasons else []
+        elif len(reasons) > 1:
+            reasons = [reason or ELSE for reason in reasons]
+        response.results = [set_result(reason) for reason in reasons]
+
+    def _set_atomically(self, request: Any, response: Any) -> None:
+        reason = next(filter(None, self._rejections(request.parameters)), "")
+        response.result = set_result(
+            reason or self._store.set([Parameter.from_parameter_msg(each) for each in request.parameters])
+        )
+
+    def _rejections(self, requested: Any) -> list[str]:
+        """Rejections found before user callbacks run, one for each parameter; empty for those that may be set."""
+        reasons, seen = [], set()
+        for each in requested:
+            reason = f"{each.name!r} is set twice in one request" if each.name in seen else self._unknown(each.name)
+            seen.add(each.name)
+            try:
+                reason = reason or self._store.rejection(Parameter.from_parameter_msg(each))
+            except (TypeError, ValueError, RuntimeError) as error:
+                reason = str(error)
+            reasons.append(reason)
+        return reasons

@@ -191,8 +191,6 @@ def test_a_service_has_two_messages_and_no_values() -> None:
     assert generated.find("nav_msgs/srv/LoadMap").Response.RESULT_INVALID_MAP_DATA == 2
     with pytest.raises(NotImplementedError, match=r"create a Trigger\.Request\(\)"):
         trigger()
-    with pytest.raises(InterfaceError, match="t/msg/T is not a service"):
-        generated.make_service(Interface("t/msg/T", "msg"))
 
 
 def test_a_message_that_ends_in_request_is_no_service() -> None:

@@ -45,7 +45,10 @@ class ClientGoalHandle(HelpfulAttributes):
 
     def cancel_goal_async(self) -> Future:
         """Ask to cancel it. Returns the future of the CancelGoal.Response."""
-        return self._client._cancel(self)
+        request = self._client._type.Impl.CancelGoalService.Request()
+        request.goal_info.goal_id = self.goal_id
+        future: Future = self._client._canceler.call_async(request)
+        return future
 
     def get_result(self) -> Any:
         """Wait for its end: a message with `status` and `result`. Raises as the future of `get_result_async`."""
@@ -53,7 +56,9 @@ class ClientGoalHandle(HelpfulAttributes):
 
     def get_result_async(self) -> Future:
         """The future of a message with `status` and `result`. It raises ServiceError if the server leaves before."""
-        return self._client._get_result(self)
+        request = self._client._type.Impl.GetResultService.Request(goal_id=self.goal_id)
+        future: Future = self._client._results.call_async(request)
+        return future
 
 
 class _ResultClient(Client):
@@ -167,16 +172,6 @@ class ActionClient(HelpfulAttributes):
         answered.set_result(handle)
         self._sender.tasks.create_task(self._report_early, identity)  # after the callbacks of `answered`
         return None
-
-    def _cancel(self, handle: ClientGoalHandle) -> Future:
-        request = self._type.Impl.CancelGoalService.Request()
-        request.goal_info.goal_id = handle.goal_id
-        future: Future = self._canceler.call_async(request)
-        return future
-
-    def _get_result(self, handle: ClientGoalHandle) -> Future:
-        future: Future = self._results.call_async(self._type.Impl.GetResultService.Request(goal_id=handle.goal_id))
-        return future
 
     def _result(self, future: Future) -> Any:
         return wait_for_reply(future, self._node.context, self._name)
