@@ -71,9 +71,10 @@ class _Lines:
         self._waiting: deque[bytes] = deque()
         self._dropped = 0
         self._is_given_up = False
-        self._lock = threading.Condition(threading.Lock())  # notified when there is room
-        self._idle = threading.Event()
-        self._idle.set()
+        # Bare locks, and no Event: Ctrl-C just after that has taken its lock would leave it locked.
+        self._lock, self._written = threading.Lock(), threading.Lock()
+        self._room = threading.Condition(self._lock)
+        self._is_idle = True
 
     def write(self, line: str, patience: float = SHORT_WAIT) -> None:
         """Queue a line. If the queue is full, wait `patience` seconds for room, but only for the first line dropped."""
@@ -86,16 +87,17 @@ class _Lines:
             return
         with self._lock:
             if not self._dropped:
-                self._lock.wait_for(lambda: len(self._waiting) < KEPT, patience)
+                self._room.wait_for(lambda: len(self._waiting) < KEPT, patience)
             if len(self._waiting) >= KEPT:
                 self._dropped += 1
                 return
             self._waiting.append(line.encode(errors="replace") + b"\n")
-            if was_idle := self._idle.is_set():
-                self._idle.clear()
+            if was_idle := self._is_idle:
+                self._written.acquire(blocking=False)
                 _thread.start_new_thread(self._run, ())
+                self._is_idle = False
         if was_idle:
-            self._idle.wait(SHORT_WAIT)
+            self._written.acquire(timeout=SHORT_WAIT)
 
     def give_up(self) -> None:
         """Send output to /dev/null if it is not being read. Takes no lock: a signal may come while it is held."""
@@ -114,7 +116,7 @@ class _Lines:
         poll.register(self._number, select.POLLOUT)
         now = time.monotonic()
         end, given_up = now + BUSY, now + seconds
-        while not self._is_given_up and not self._idle.wait(0.01):
+        while not (self._is_given_up or self._is_idle or self._written.acquire(timeout=0.01)):
             now = time.monotonic()
             if poll.poll(0):  # there is room: the writing thread has not run yet, on a busy machine
                 given_up = now + seconds
@@ -135,12 +137,14 @@ class _Lines:
         """The next data to write; empty when this thread may end."""
         with self._lock:
             if self._waiting:
-                self._lock.notify()
+                self._room.notify()
                 return self._waiting.popleft()
             dropped, self._dropped = self._dropped, 0
             if dropped:
                 return f"... and {dropped} more lines were dropped, as the output was not read\n".encode()
-            self._idle.set()
+            self._is_idle = True
+            if self._written.locked():
+                self._written.release()
             return b""
 
 

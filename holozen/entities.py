@@ -255,13 +255,11 @@ def _check_that_all_did(bus: Bus, did: int, sims: int) -> None:
         raise ServiceError(f"{sims - did} of {sims} sims refused or did not answer, {DONE}")
 
 
-def _control(bus: Bus, key: str, request: Message, reply: type[Any], more: float = 0.0) -> list[str]:
-    """Ask all sims, which may take `more` seconds longer than usual, and return their warnings. Raises ServiceError,
-    also if one of them did not do it.
-    """
+def _control(bus: Bus, key: str, request: Message, reply: type[Any]) -> list[str]:
+    """Ask all sims, and return their warnings. Raises ServiceError, also if one of them did not do it."""
     ask_sims(bus, "get_simulation_state", si.GetSimulationStateRequest(), si.GetSimulationStateReply)
     sims = len(bus.endpoints(SIMS))
-    answers = bus.call_all(key, request, reply, PATIENCE + more)
+    answers = bus.call_all(key, request, reply, PATIENCE)
     _check_that_all_did(bus, len(answers), sims)
     return [warning for answer in answers if (warning := answer.result.error_message)]
 

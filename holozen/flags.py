@@ -90,6 +90,18 @@ class Parser(argparse.ArgumentParser):
             raise argparse.ArgumentError(action, f"{value!r}{suggest(value, words)}; there are {', '.join(words)}")
 
 
+class Instead(argparse.Action):
+    """A flag of ros2 without a meaning here, which is refused in one line with `advice` on what to use."""
+
+    def __init__(self, option_strings: list[str], dest: str, advice: str) -> None:
+        super().__init__(option_strings, dest, nargs="?", default=argparse.SUPPRESS, help=argparse.SUPPRESS)
+        self._advice = advice
+
+    def __call__(self, parser: argparse.ArgumentParser, _args: object, _value: object, flag: str | None = None) -> None:
+        """Refuse it."""
+        parser.error(f"no flag {flag!r}; {self._advice}")
+
+
 def refused(text: str) -> Exception:
     """The error that a parser of values raises."""
     return argparse.ArgumentTypeError(text)

@@ -29,11 +29,6 @@ def ramp(now: Planar, wanted: Planar, linear: float, angular: float, dt: float) 
     return now[0] + dx, now[1] + dy, now[2] + dturn
 
 
-def wrap(angle: float) -> float:
-    """`angle` in radians, wrapped to [-pi, pi]."""
-    return math.remainder(angle, math.tau)
-
-
 def not_finite(value: object) -> str:
     """The path of the first number in plain values that is NaN or infinite, such as `linear.x`; else empty."""
     return next(_bad_numbers(value, ""), "")

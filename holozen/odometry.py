@@ -1,24 +1,41 @@
-"""A robot's odometry as feedback for driving it: whether it is stale or lost, the robot rests, or is another one."""
+"""A robot's odometry: its messages, and as feedback for driving it, whether it is stale or lost, the robot rests, or is
+another one.
+"""
 
 import math
 import time
 
 from holozen.bus import Bus, Latest
-from holozen.messages import Odometry, SimulationStatus
-from holozen.wire import topic
+from holozen.limits import Planar
+from holozen.messages import Header, Odometry, SimulationStatus
+from holozen.messages import geometry_msgs as gm
+from holozen.messages.simulation_interfaces import SimulationState
+from holozen.rotation import XYZ, XYZW
+from holozen.wire import ODOM_SILENCE, SIM_SILENCE
 
 RESTS = 0.01  # m/s and rad/s; slower counts as at rest
 LOST = 0.4  # s without odom, once some arrived, so as not to drive blind; less than the sim's command timeout
+UNKNOWN = [0.0] * 36  # covariances, row by row
 JUMP = 0.5  # m between two looks, more than its motion explains, that mean a reset
+
+
+def odometry(
+    header: Header, child: str, position: XYZ, rotation: XYZW, velocity: Planar, variances: list[float] = UNKNOWN
+) -> Odometry:
+    """Odometry with a pose in the frame of `header` and a velocity in the body frame `child`."""
+    pose = gm.PoseWithCovariance(gm.Pose.of(position, rotation), variances)
+    return Odometry(header, child, pose, gm.TwistWithCovariance(gm.Twist.planar(*velocity), variances))
+
+
+def transform(header: Header, child: str, position: XYZ, rotation: XYZW) -> gm.TransformStamped:
+    """The pose of the frame `child` in the frame of `header`."""
+    return gm.TransformStamped(header, child, gm.Transform(gm.Vector3(*position), gm.Quaternion(*rotation)))
 
 
 class RobotFeedback(Latest[Odometry]):
     """The newest odometry on `key`, for a driver, which has to know when its robot is another one, or starts again."""
 
     def __init__(self, bus: Bus, key: str) -> None:
-        row = topic("odom")
-        assert row is not None
-        self._silence = row.silence
         super().__init__(bus.state(key, Odometry))
         self._writers = bus.writers(key)
         self._sim = bus.latest("simulation_status", SimulationStatus)
@@ -28,7 +45,7 @@ class RobotFeedback(Latest[Odometry]):
     @property
     def stale_after(self) -> float:
         """The age in s beyond which it is too old to show, or to act on, as current."""
-        return self.patience(self._silence)
+        return self.patience(ODOM_SILENCE)
 
     @property
     def is_stale(self) -> bool:
@@ -39,6 +56,12 @@ class RobotFeedback(Latest[Odometry]):
     def is_lost(self) -> bool:
         """Whether it has stopped arriving."""
         return self.count > 0 and self.read()[1] > max(LOST, self.stale_after)
+
+    @property
+    def is_paused(self) -> bool:
+        """Whether its sim is paused. What publishes no status, such as a real base, is not."""
+        sim, age = self._sim.read()
+        return sim is not None and sim.state == SimulationState.STATE_PAUSED and age < SIM_SILENCE
 
     def rests(self, since: float) -> bool:
         """Whether what was received after `since` (s, monotonic) shows a robot at rest."""

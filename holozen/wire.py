@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from holozen.messages import Message
 
 COMMAND_SILENCE = 0.5  # s; a robot without a fresh command for this long stops
+ODOM_SILENCE = 0.2  # s; older odometry is stale, unless it comes at a slower rate
+SIM_SILENCE = 1.0  # s; an older status of a sim is stale
 MAX_ENTITIES = 1000  # of one sim; each takes time at every step
 MAX_COMMAND_BYTES = 65_536  # a Twist takes about 100; a larger command is not decoded
 MAX_STAMP_AGE = 0.5  # s; an older (or as far future) stamp on a TwistStamped is refused
@@ -84,13 +86,14 @@ class Action(NamedTuple):
 TOPICS = (
     Topic("cmd_vel", ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"), ("teleop", "view", "controller"),
           ("sim",), 20.0, COMMAND_SILENCE, "0.5 s without a fresh one: the robot stops"),
-    Topic("odom", ("nav_msgs/msg/Odometry",), ("sim",), ("teleop", "view", "controller", "pose_service"), 50.0, 0.2,
-          "0.2 s: shown as stale, the controller stops"),
+    Topic("odom", ("nav_msgs/msg/Odometry",), ("sim",), ("teleop", "view", "controller", "pose_service"), 50.0,
+          ODOM_SILENCE, "0.2 s: shown as stale, the controller stops"),
     Topic("cmd_vel_status", ("holozen/msg/CommandStatus",), ("sim",), ("teleop", "view", "controller"), 10.0, 1.0, ""),
     Topic("joint_states", ("sensor_msgs/msg/JointState",), ("sim",), (), 50.0, 0.2, ""),
     Topic("tf", ("tf2_msgs/msg/TFMessage",), ("sim",), (), 50.0, 0.2, ""),
     Topic("clock", ("rosgraph_msgs/msg/Clock",), ("sim",), (), 50.0, 0.2, ""),
-    Topic("simulation_status", ("holozen/msg/SimulationStatus",), ("sim",), ("teleop", "controller"), 10.0, 1.0, ""),
+    Topic("simulation_status", ("holozen/msg/SimulationStatus",), ("sim",), ("teleop", "controller"), 10.0, SIM_SILENCE,
+          ""),
     Topic("scan", ("sensor_msgs/msg/LaserScan",), ("sim",), (), 10.0, 1.0, ""),
     Topic("imu", ("sensor_msgs/msg/Imu",), ("sim",), (), 100.0, 0.2, ""),
     Topic("exposures", ("holozen/msg/Exposure",), ("sim",), ("camera",), 10.0, 1.0, ""),

@@ -6,6 +6,7 @@ from typing import Any
 
 from holozen import cli
 from holozen.cli.verb import ROS2_TITLE, Noun, Service
+from holozen.flags import Instead
 
 LEFT_OUT = ("zenoh", ROS2_TITLE)  # groups of flags that many verbs have
 
@@ -27,7 +28,8 @@ def _parsers(command: Any) -> Iterator[argparse.ArgumentParser]:
 def _row(parser: argparse.ArgumentParser) -> str:
     groups = [group for group in parser._action_groups if group.title in LEFT_OUT]
     left_out = {id(action) for group in groups for action in group._group_actions}
-    actions = [action for action in parser._actions if id(action) not in left_out and action.dest != "help"]
+    shown = (action for action in parser._actions if not isinstance(action, Instead))
+    actions = [action for action in shown if id(action) not in left_out and action.dest != "help"]
     places = [_place(action) for action in actions if not action.option_strings]
     flags = [f"`{_flag(action)}`" for action in actions if action.option_strings]
     does = " ".join((parser.description or "").split())

@@ -290,7 +290,7 @@ class Player:
     sent the message: only then it counts.
 
     After a gap, as when the process was suspended, it goes on from where it was; `on_gap` gets the length in s.
-    `paused` and `position` (ns, of the last message) are for the display.
+    It begins in a pause if `paused`. `paused` and `position` (ns, of the last message) are for the display.
     """
 
     def __init__(
@@ -301,8 +301,9 @@ class Player:
         stop: threading.Event,
         rate: float = 1.0,
         on_gap: Callable[[float], None] = lambda _: None,
+        paused: bool = False,
     ) -> None:
-        self.paused, self.position, self.count = False, 0, 0
+        self.paused, self.position, self.count = paused, 0, 0
         self._publish, self._hold, self._read_key, self._stop = publish, hold, read_key, stop
         self._pace = Pace(rate)
         self._on_gap = on_gap
@@ -315,7 +316,7 @@ class Player:
         begun = False
         for message in messages:
             if not begun:
-                self._ran = time.monotonic()
+                self._ran, self._held = time.monotonic(), message.at
                 self._pace.jump(message.at, self._ran)
                 begun = True
             if not self._wait_for(message.at, on_look):

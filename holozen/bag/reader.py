@@ -17,13 +17,14 @@ FILES = (".mcap", ".db3")
 
 
 class Bag:
-    """A file to read, or a folder of ROS 2 with such files.
+    """A file to read, also by its name without .mcap, or a folder of ROS 2 with such files.
 
     Once its messages are read, `cut_off` is true if the end of a file is missing. While they are read, `numbered` is
     true if the numbers of the messages include lost ones.
     """
 
     def __init__(self, path: Path) -> None:
+        path = recorded(path)
         self.path, self.cut_off, self.numbered = path, False, False
         self._files: list[McapFile | SqliteFile] = []
         try:
@@ -52,6 +53,12 @@ class Bag:
                 self.numbered = file.numbered
                 yield message
             self.cut_off |= file.cut_off
+
+
+def recorded(path: Path) -> Path:
+    """`path`, or where that is nothing, the file that `record -o` writes under this name."""
+    written = path.parent / f"{path.name}.mcap"
+    return written if not path.exists() and written.exists() else path
 
 
 def files_of(path: Path) -> list[Path]:

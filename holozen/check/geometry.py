@@ -99,7 +99,7 @@ def _solid(shape: Shape) -> Shape:
 
 def fixed_bodies(model: RobotModel) -> list[list[str]]:
     """The rigid bodies of a robot: for each, the links that fixed joints connect, the one nearest to the root first."""
-    fixed = {joint.child: joint.parent for joint in model.joints.values() if joint.kind not in MOVING}
+    fixed = {joint.child: joint.parent for joint in model.joints.values() if joint.kind == "fixed"}
     bodies: dict[str, list[str]] = {}
     for name in model.links:
         head = name
@@ -122,7 +122,6 @@ def body_of(link: str, model: RobotModel) -> list[str]:
 ALIGNED = math.cos(math.radians(5))
 SLACK = 0.1  # of a wheel's radius
 LEAST = 0.002  # m
-MOVING = ("continuous", "revolute", "prismatic", "floating", "planar")
 
 _NAMED = re.compile(r"wheel|tyre|tire(?!d)|(^|_)w[FBRL][LR]?$", re.IGNORECASE)
 _NOT_ROLLING = re.compile(r"steer|caster|castor|swivel|roller|rotor|prop", re.IGNORECASE)
@@ -224,7 +223,7 @@ def _is_free(joint: Joint, model: RobotModel, body: list[str]) -> bool:
     """Whether no other joint above or below it moves: the wheels of casters, rollers and suspensions do not count."""
     above = {other.child: other for other in model.joints.values()}
     below = [other for other in model.joints.values() if other.parent in body]
-    if any(other.kind in MOVING for other in below):
+    if any(other.kind != "fixed" for other in below):
         return False
     other = above.get(joint.parent)
     while other is not None and other.kind == "fixed":

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from holozen.check.engine import Edit, Mistake, Subject, rule
-from holozen.check.geometry import MOVING, box_of, extent, fixed_bodies, size_of
+from holozen.check.geometry import box_of, extent, fixed_bodies, size_of
 from holozen.robot.elements import Tag, number
 from holozen.robot.inertia import impossible, of_shapes
 from holozen.robot.model import HERE, Link, Moments
@@ -231,7 +231,7 @@ def _tensor(tag: Tag) -> Moments | None:
 
 
 def _carries(name: str, subject: Subject) -> bool:
-    return any(joint.parent == name and joint.kind in MOVING for joint in subject.loaded.joints.values())
+    return any(joint.parent == name and joint.kind != "fixed" for joint in subject.loaded.joints.values())
 
 
 def _volume(size: Array) -> float:

@@ -33,7 +33,7 @@ VERBS = {
     "check": "report what is wrong with a robot file",
     "topic": "list, info, type, find, echo, pub, hz, bw, delay, plot",
     "service": "list, type, find, info, call",
-    "action": "list, info, send_goal",
+    "action": "list, type, info, send_goal",
     "node": "list, info",
     "param": "list, get, set, describe, dump, load",
     "tf": "echo",

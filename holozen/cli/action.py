@@ -12,7 +12,7 @@ from typing import Any
 from holozen.background import background
 from holozen.bus import Bus
 from holozen.cli.hints import unknown
-from holozen.cli.keys import print_list, print_sides
+from holozen.cli.keys import print_list, print_sides, print_types
 from holozen.cli.output import Reader, lines
 from holozen.cli.verb import Noun, Verb, by_name, key_argument, list_arguments, open_bus, type_and_value
 from holozen.console import Failure, report
@@ -43,6 +43,14 @@ def list_actions(args: argparse.Namespace) -> int:
     with open_bus(args) as bus:
         ends, where = bus.endpoints(), bus.where
     return print_list(args, "action", ((action.key, action.type) for action in found_in(ends)), ends, where)
+
+
+def action_type(args: argparse.Namespace) -> int:
+    """Print the type of an action. Raises Failure if no node serves or uses it."""
+    with open_bus(args) as bus:
+        found, where = found_in(bus.endpoints()), bus.where
+    types = {one.type for one in found if one.key == args.key}
+    return print_types(args, types, {one.key for one in found}, where)
 
 
 def info(args: argparse.Namespace) -> int:
@@ -202,6 +210,7 @@ def _send_arguments(parser: argparse.ArgumentParser) -> None:
 VERBS = by_name(
     Noun("action", "inspect actions, and send goals"),
     Verb("action list", "list the actions that nodes serve or use", "-t", list_arguments("action"), list_actions),
+    Verb("action type", "show an action's type", "navigate_to_pose", key_argument, action_type),
     Verb("action info", "show an action's type, clients and servers", "navigate_to_pose", key_argument, info),
     Verb("action send_goal", "send a goal and wait for its result; Ctrl-C cancels the goal",
         """navigate_to_pose '{"pose": {"pose": {"position": {"x": 1.0}}}}' --feedback""", _send_arguments, send_goal),

@@ -25,8 +25,9 @@ def info(args: argparse.Namespace) -> int:
 def plot(args: argparse.Namespace) -> int:
     """Draw a file's odometry into a picture."""
     from holozen.bag.drawing import draw
+    from holozen.bag.reader import recorded
 
-    target = args.output or args.file.with_suffix(".png")
+    target = args.output or recorded(args.file).with_suffix(".png")
     drawn = draw(args.file, target, args.topics)
     if args.json:
         print(json.dumps({"file": str(args.file), "picture": str(target), "topics": drawn}))

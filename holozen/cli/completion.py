@@ -83,7 +83,8 @@ def _candidates(words: list[str], verbs: Iterable[str], command: Callable[[str],
     if isinstance(noun := command(before[0]), Service) and not before[1:] and not current.startswith("-"):
         found = list(noun.modules)
     elif current.startswith("-"):
-        found = [flag for flag in parser._option_string_actions if flag.startswith("--")]
+        flags = parser._option_string_actions.items()
+        found = [flag for flag, action in flags if flag.startswith("--") and action.help != argparse.SUPPRESS]
     elif action is None:
         return []
     elif action.choices is not None:

@@ -183,8 +183,9 @@ class Printer:
 
     def report_skipped(self, why: str) -> None:
         """Report how many samples could not be shown, if any, and `why` the last one could not."""
+        verb, of_all = f"holozen {self._args.verb}", f"of {self._count} samples"
         if self._undecoded:
             last = "the last: " * (self._undecoded > 1)
-            report(f"{self._undecoded} of {self._count} samples could not be decoded; {last}{why}")
+            report(f"{verb}: {self._undecoded} {of_all} could not be decoded; {last}{why}")
         if self._fieldless:
-            report(f"{self._fieldless} of {self._count} samples have no field {self._args.field}")
+            report(f"{verb}: {self._fieldless} {of_all} have no field {self._args.field}")

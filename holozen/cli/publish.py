@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
-import math
 import queue
 import sys
 import threading
@@ -20,6 +19,7 @@ from holozen.bus import Bus
 from holozen.cli import values
 from holozen.cli.hints import suggest_key
 from holozen.cli.output import decode
+from holozen.command.feedback import VELOCITIES, CommandFeedback
 from holozen.console import Failure, report
 from holozen.limits import not_finite
 from holozen.messages import WIRES, CodecError, encoding_of
@@ -35,8 +35,8 @@ STOPS, STOP_EVERY = 5, 0.02  # s
 CLOCK_PATIENCE = 0.2  # s to wait for the robot to ask for our clock
 LOOK = 0.1  # s between two checks for a line of standard input
 VERDICT = 0.3, 2.0  # s to wait for the sim's status, which comes at 10 Hz: where none was found, and where one was
-FRESH = 1.0  # s; an older status is ignored
-COVERED = 3  # statuses after a command, of which the last was sent after the command has been read
+PAUSED = "; the sim is paused; `holozen sim play` continues it"
+LEFT = "; it has left, and its last command counts until the robot's timeout: try again in a moment"
 FORCE = "; --force sends it all the same"
 
 
@@ -64,13 +64,14 @@ def _run(
     matched = 0 if args.no_wait else _matched(bus, publisher, args, stop, looking)
     if not args.no_wait:
         counted = f"{matched or 'no'} subscriber{'s' * (matched != 1)} of {args.key}"
-        report(counted if matched else f"{counted}{suggest_key(bus, [args.key], ('sub',))}")
+        counted += "" if matched else suggest_key(bus, [args.key], ("sub",))
         if not matched and (args.once or args.times):
-            return 1
+            raise Failure(counted)
+        report(counted)
         if args.wait and matched < args.wait and not stop.is_set():
             raise Failure(f"{args.key}: {args.wait} subscribers did not come in time, so nothing is published")
     status_key = form.status_key
-    feedback = CommandFeedback(bus, status_key, form.is_velocity) if status_key else None
+    feedback = _feedback(bus, status_key, form.is_velocity) if status_key else None
     if feedback and matched and payload not in form.stops:
         bus.clock_asked.wait(CLOCK_PATIENCE)  # only a stop is obeyed before the robot knows our clock
     turns = _lines(form, args, stop) if args.stdin else _turns(form, payload, args, stop)
@@ -80,12 +81,15 @@ def _run(
             publisher.put_bytes(each)
             sent += 1
             if feedback:
+                feedback.strafes = form.strafes
                 feedback.look()
         if feedback and (args.once or args.times) and matched:
             feedback.wait(stop, VERDICT[bool(on_key(looking(), status_key, "pub"))])
     finally:
         if form.stops and not args.once:
             _stop_robot(publisher, form.stops)
+            if feedback:
+                feedback.report_held()
     if args.json:
         print(json.dumps({"key": args.key, "type": form.kind.name, "subscribers": matched, "published": sent}))
     return int(bool(feedback and feedback.refusal and (args.once or args.times) and payload not in form.stops))
@@ -212,42 +216,20 @@ def _stop_robot(publisher: RawPublisher, stops: set[bytes]) -> None:
         time.sleep(STOP_EVERY)
 
 
-LIMITED = "over the limits"  # prefix of the sim's reason when it drives slower than commanded
-OVERRULED = "overruled"  # prefix of its reason when a higher source drives
-DRIVES = " drives"
-PAUSED = "; the sim is paused; `holozen sim play` continues it"
-LEFT = "; it has left, and its last command counts until the robot's timeout: try again in a moment"
-HELD = "held, since a higher source took over"
-RESUME = "; `{command}` lets it drive again"
+def _feedback(bus: Bus, key: str, is_velocity: bool) -> CommandFeedback:
+    def more(driver: str) -> str:
+        from holozen import entities
 
+        ends = bus.endpoints()
+        sims = {end.session for end in on_key(ends, key, "pub")}
+        if entities.is_paused(bus, [end for end in ends if end.session in sims]):
+            return PAUSED
+        # A driver without a node may be anyone's.
+        return LEFT if "@" in driver and driver not in {end.source for end in ends} else ""
 
-def verdict(status: Any, source: str) -> str | None:
-    """Why the robot does not follow the commands of `source`, by a CommandStatus; empty if it does. None if the sim has
-    not received any yet: a status sent before the command arrived does not cover it.
-    """
-    mine = next((each for each in status.sources if each.source == source), None)
-    own_refusal = status.last_refusal.removeprefix(f"{source}: ")
-    if own_refusal == status.last_refusal:
-        own_refusal = ""
-    if status.stopped:
-        return f"{status.stopped} has set the software stop"
-    if status.obeyed == source or (mine and mine.obeyed):
-        return own_refusal if own_refusal.startswith(LIMITED) else ""
-    if mine and mine.held:
-        return HELD
-    if mine and status.obeyed and own_refusal.partition(":")[0] in ("", OVERRULED):
-        return f"{status.obeyed}{DRIVES}"
-    return own_refusal or None
-
-
-def verdict_on_part(status: Any, before: Any, source: str) -> str | None:
-    """As `verdict`, of commands to joints or forces, whose sources a status names only where they drive or are refused.
-    `before` is the status before it: a command that is accepted after a refusal is known by the counts.
-    """
-    why = verdict(status, source)
-    if not why or status.stopped or status.refused != before.refused:
-        return why
-    return "" if status.accepted > before.accepted and not status.obeyed and not status.sources else None
+    read = partial(_status, Registry().find("holozen/msg/CommandStatus"))
+    latest: Latest[Any] = Latest(Subscription(bus.subscribe_raw(key, depth=1), read))
+    return CommandFeedback(bus.source, key, latest, is_velocity, more=more)
 
 
 def _status(kind: Interface, sample: Sample) -> Any:
@@ -260,70 +242,6 @@ def _status(kind: Interface, sample: Sample) -> Any:
         return _object(completed(kind, decode(sample.payload, sample.encoding), tolerant=True))
     except InterfaceError as error:
         raise CodecError(str(error)) from None
-
-
-class CommandFeedback:
-    """Reports when the robot with the command status on `key` starts or stops obeying. If the commands are no
-    velocities (`is_velocity`) but move joints or are forces, they are judged by `verdict_on_part`.
-    """
-
-    def __init__(self, bus: Bus, key: str, is_velocity: bool = True) -> None:
-        self._bus, self._key, self._is_velocity, self._reported = bus, key, is_velocity, ""
-        self._judged: Any = None  # the last status, and the one before
-        self._before: Any = None
-        self.refusal = ""
-        """Why the robot does not obey, by the latest look; empty if it does, or is not known to."""
-        read = partial(_status, Registry().find("holozen/msg/CommandStatus"))
-        self._latest: Latest[Any] = Latest(Subscription(bus.subscribe_raw(key, depth=1), read))
-
-    def look(self) -> bool:
-        """Report any change; returns whether the sim has judged our commands yet."""
-        status, age = self._latest.read()
-        why = self._verdict(status) if status and age < FRESH else None
-        if why is None:
-            return False
-        if why != self._reported:
-            driver = status.obeyed if status and why.endswith(DRIVES) else ""
-            if why and not why.startswith(LIMITED):
-                ending = PAUSED if self._is_paused() else LEFT if self._has_left(driver) else ""
-                command = wire.resume_command(self._key.rpartition("/")[0])
-                resume = RESUME.format(command=command) if why == HELD else ""
-                report(f"not obeyed: {why}{resume}{ending}")
-            else:
-                report(why or "obeyed again")
-        self._reported, self.refusal = why, "" if why.startswith(LIMITED) else why
-        return True
-
-    def _verdict(self, status: Any) -> str | None:
-        if self._is_velocity:
-            return verdict(status, self._bus.source)
-        if status is not self._judged:
-            self._before, self._judged = self._judged or SimpleNamespace(refused=None, accepted=math.inf), status
-        return verdict_on_part(status, self._before, self._bus.source)
-
-    def _has_left(self, driver: str) -> bool:
-        """Whether a source is none of the nodes that are there; one without a node may be anyone's."""
-        return "@" in driver and driver not in {end.source for end in self._bus.endpoints()}
-
-    def _is_paused(self) -> bool:
-        """Whether the robot's sim is paused."""
-        from holozen import entities
-
-        ends = self._bus.endpoints()
-        sims = {end.session for end in on_key(ends, self._key, "pub")}
-        return entities.is_paused(self._bus, [end for end in ends if end.session in sims])
-
-    def wait(self, stop: threading.Event, seconds: float) -> None:
-        """Wait until the sim has judged our commands; report if it has not after so many `seconds`."""
-        deadline, received = time.monotonic() + seconds, self._latest.count
-        while not self.look() and not stop.wait(0.002):
-            if not self._is_velocity and self._latest.count >= received + COVERED:
-                return  # it says nothing of what it accepts
-            if time.monotonic() > deadline:
-                if self._latest.read()[1] < FRESH and self._is_velocity:
-                    self.refusal = "the sim has not received it; does anything flood it?"
-                    report(f"not obeyed: {self.refusal}")
-                return
 
 
 # The value.
@@ -342,6 +260,8 @@ class Form:
         self._key, self._is_command = args.key, ours and wire.is_command(args.key, type_names)
         self.stops: set[bytes] = set()
         """The bytes that stop what its payloads move."""
+        self.strafes = False
+        """Whether a payload commands a velocity with a sideways part."""
 
     @property
     def encoding(self) -> str:
@@ -351,7 +271,7 @@ class Form:
     @property
     def is_velocity(self) -> bool:
         """Whether it commands a velocity."""
-        return self._is_command and self.kind.name in ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
+        return self._is_command and self.kind.name in VELOCITIES
 
     @property
     def status_key(self) -> str:
@@ -373,6 +293,8 @@ class Form:
                 raise ValueError(f"{bad}{FORCE}")
             if (fields := wire.stop(command, self.kind.name)) is not None:
                 self.stops.add(written(self.kind, completed(self.kind, fields), self._wire))
+            if self.is_velocity:
+                self.strafes |= getattr(command, "twist", command).linear.y != 0
         return written(self.kind, value, self._wire)
 
     def _message(self, value: Any) -> dict[str, Any]:

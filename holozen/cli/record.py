@@ -30,6 +30,7 @@ REPORT_EVERY = {True: 0.5, False: 5.0}  # s between two lines, in a terminal and
 
 def run(args: argparse.Namespace) -> int:
     """Record until Ctrl-C, or until --max-duration has passed."""
+    args.keys += args.topics
     if bool(args.keys) == args.all:
         args.error("give keys or -a, not both" if args.all else "name the keys to record, or use -a for all")
     from holozen.bag.writer import BagWriter, RosBagWriter
@@ -223,6 +224,7 @@ class Progress:
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("keys", nargs="*", type=key, metavar="KEY", help="a key or key expression, such as */odom")
+    add("--topics", nargs="+", type=key, default=[], metavar="KEY", help="more of them, as for ros2 bag record")
     add("-a", "--all", action="store_true", help="every key")
     add("-o", "--output", metavar="NAME", help="write NAME.mcap (default: holozen_DATE-TIME.mcap)")
     add("--max-size", type=number(0.1, 1e6, "MB"), metavar="MB",

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import sys
 import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 from holozen.bus import Bus
 from holozen.cli.verb import Verb, by_name
 from holozen.console import Failure, Line, printable, report
-from holozen.flags import key, number, path, refused
+from holozen.flags import Instead, key, number, path, refused
 from holozen.process import stop_event
 from holozen.transport import connection
 
@@ -33,6 +34,8 @@ def run(args: argparse.Namespace) -> int:
     olds = [old for old, _ in args.remap]
     if twice := next((old for old in olds if olds.count(old) > 1), ""):
         args.error(f"--remap: {twice!r} is given twice; it is played on one key")
+    if args.start_paused and not sys.stdin.isatty():
+        args.error("--start-paused needs a terminal, in which space goes on")
     stop, summaries = stop_event(), []
     for file in args.files:
         with Bag(file) as bag:
@@ -51,7 +54,8 @@ def run(args: argparse.Namespace) -> int:
         outlet = Outlet(bus, made)
         outlet.settle()
         with keys(stop) as pressed:
-            player = Player(outlet.publish, outlet.stop, pressed, stop, args.rate, _report_gap)
+            player = Player(outlet.publish, outlet.stop, pressed, stop, args.rate, _report_gap, args.start_paused)
+            stop.wait(args.delay)
             return _play(args, summaries, player, outlet, set(made.targets))
 
 
@@ -144,6 +148,16 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--until", type=number(0, 1e9, "s"), metavar="S", help="stop S seconds after the start of the bag")
     add("--topics", nargs="+", type=key, metavar="KEY", help="only these keys or key expressions")
     add("--remap", nargs="+", type=_remap, default=[], metavar="OLD:=NEW", help="play on another key")
+    add(
+        "-d",
+        "--delay",
+        type=number(0, 1e6, "s"),
+        default=0.0,
+        metavar="S",
+        help="wait S seconds before the first message",
+    )
+    add("-p", "--start-paused", action="store_true", help="begin with a pause, which space ends in a terminal")
+    add("--clock", action=Instead, advice="a bag that has the key clock plays it: `holozen record -a` records it too")
     add("--commands", action="store_true",
         help="also play keys that move robots; they are stopped at the end, but not on the way to a goal")  # fmt: skip
 

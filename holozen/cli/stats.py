@@ -115,6 +115,7 @@ class Watch:
         keys = ", ".join(self._args.keys)
         many = len(self._args.keys) > 1 or "*" in keys
         near: str | None = None  # looked up once no messages arrive
+        excused = False  # by the last look: at the first one the clock of the stamps may not have come yet
         while not stop.wait(EVERY):
             reports = self._reports()
             for name, values in reports.items():
@@ -124,6 +125,11 @@ class Watch:
                 if self._args.once:
                     return
                 deadline = None
+                continue
+            if self._args.once and (why := self._excuse()):
+                if excused:
+                    raise Failure(why)
+                excused = True
                 continue
             if near is None:
                 near = suggest_key(bus, self._args.keys)

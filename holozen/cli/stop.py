@@ -167,16 +167,14 @@ class Orders:
         """
         if not self.found:
             return False
-        for end in (silent := [end for end in self._bus.hidden() if self._is_wanted(end.key)]):
-            order = Order(end.key.removesuffix("stop").removesuffix("/"), self._verb, self._began)
-            order.message = UNREACHED.format(source=end.source)
-            self._print(order)
-        return bool(silent)
-
-    def _is_wanted(self, stop: str) -> bool:
-        """Whether a service, if it is one that stops a robot, is that of a robot to reach."""
-        robot, _, verb = stop.rpartition("/")
-        return verb == "stop" and self._is_meant(robot)
+        silent = False
+        for end in self._bus.hidden():
+            robot, _, verb = end.key.rpartition("/")
+            if verb == "stop" and self._is_meant(robot):
+                silent, order = True, Order(robot, self._verb, self._began)
+                order.message = UNREACHED.format(source=end.source)
+                self._print(order)
+        return silent
 
     def _is_meant(self, robot: str) -> bool:
         return not self._wanted or robot in self._wanted or robot in self._orders
@@ -236,11 +234,11 @@ class Orders:
             more = f": {message}" if message else ""
             return print(printable(f"{name} {DONE[self._verb]}{more}"), flush=True)
         if order.outdated:
-            return report(f"{name} is not released: {message}")
+            return report(f"holozen {self._verb}: {name} is not released: {message}")
         because = f" ({message})" if message else ""
         risk = "; it may move" if self._verb == "stop" else ""
         within = f" within {self._args.timeout:g} s" if order.discovered else ""
-        return report(f"{name} did not confirm{within}{because}{risk}")
+        return report(f"holozen {self._verb}: {name} did not confirm{within}{because}{risk}")
 
     def _named(self, robot: str) -> str:
         return robot or self._root or "the robot at the root"

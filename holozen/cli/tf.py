@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 TICK = 0.01  # s between two polls
 ASK = 0.3  # s to wait for replies with static transforms
 WAITING = 1.0  # s without a transform until that is reported
-_TF = re.compile(r".+/tf(_static)?$")
+_TF = re.compile(r"(.+/)?tf(_static)?$")
 
 
 def echo(args: argparse.Namespace) -> int:
@@ -85,8 +85,12 @@ def _why(bus: Bus, key: str, frames: Frames, error: LookupError) -> str:
         return str(error)
     if not bus.connected():
         return f"no transforms on {key}; {no_nodes(bus.where)}"
-    others = sorted({end.key.rpartition("/")[0] for end in bus.endpoints() if end.kind == "pub" and _TF.match(end.key)})
-    return f"no transforms on {key}{f'; there are some with --robot {listed(others)}' if others else ''}"
+    others = {end.key.rpartition("/")[0] for end in bus.endpoints() if end.kind == "pub" and _TF.match(end.key)}
+    flags = ["without --robot"] if "" in others and key != "tf" else []
+    if named := others - {"", key.rpartition("/")[0]}:
+        flags.append(f"with --robot {listed(named)}")
+    hint = f"; there are some {' and '.join(flags)}" if flags else ""
+    return f"no transforms on {key}{hint}"
 
 
 def _print(args: argparse.Namespace, pose: Transform, stamp: float) -> None:

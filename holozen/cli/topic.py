@@ -17,7 +17,7 @@ from holozen.cli.verb import (
     open_bus,
     type_and_value,
 )
-from holozen.flags import add_packages, count, key, number
+from holozen.flags import Instead, add_packages, count, key, number
 from holozen.process import deferred_interrupt
 
 LISTEN = 1.0  # s to listen for samples of foreign nodes, also by `info -v`
@@ -32,6 +32,7 @@ def pub(args: argparse.Namespace) -> int:
         args.error(f"{args.key}: {args.value!r} is too much; with --stdin the values come from there")
     if args.value is None and not (args.type or args.stdin):
         args.error(f"{args.key}: a value is missing; write holozen topic pub {PUB_EXAMPLE}")
+    args.no_wait |= args.wait == 0
     if not (args.wait or args.max_wait):
         args.max_wait = PUB_PATIENCE
     with open_bus(args) as bus:
@@ -74,6 +75,7 @@ def _echo_arguments(parser: argparse.ArgumentParser) -> None:
     add("--filter", metavar="EXPR", help="only messages of which this is true, such as 'm.linear.x > 0.2'")
     add("--csv", action="store_true", help="values separated by commas, one message per line")
     add("--raw", action="store_true", help="the bytes as they came; on a terminal, escaped")
+    add("--flow-style", action=Instead, advice="--json prints each message on one line")
     add("--no-arr", action="store_true", help="only the length of lists")
     add("--no-str", action="store_true", help="only the length of texts")
     text = "show at most N values of a list and characters of a text (default: 128 values of a list)"
@@ -92,8 +94,8 @@ def _pub_arguments(parser: argparse.ArgumentParser) -> None:
     add("-r", "--rate", type=number(0.01, 10_000, "Hz"), metavar="HZ", help="(default: the topic's own rate, or 1)")
     add("-1", "--once", action="store_true", help="publish once, as soon as there is a subscriber")
     add("-t", "--times", type=count(1), metavar="N", help="publish N times")
-    add("-w", "--wait", "--wait-matching-subscriptions", type=count(1), metavar="N",
-        help=f"wait for N subscribers, for ever (default: for one, {PUB_PATIENCE:g} s)")  # fmt: skip
+    add("-w", "--wait", "--wait-matching-subscriptions", type=count(), metavar="N",
+        help=f"wait for N subscribers, for ever; 0: do not wait (default: for one, {PUB_PATIENCE:g} s)")  # fmt: skip
     add("--max-wait", "--max-wait-time-secs", type=number(0.01, 1e6, "s"), metavar="S", help="wait at most S seconds")
     add("--no-wait", action="store_true", help="do not wait for a subscriber")
     add("--force", action="store_true", help="also send numbers that are not finite")

@@ -6,7 +6,7 @@ import argparse
 import importlib
 import re
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 from holozen.flags import Parser, count, key, number
@@ -37,6 +37,7 @@ _ROS2 = {
                    "--no-lost-messages"),
     "topic pub": (*_QOS, "--keep-alive S"),
     "service find": (_SERVICES,),
+    "launch": ("-n", "--noninteractive", "-d", "--debug", "-a", "--show-all-subprocesses-output"),
     "node list": ("-a", "--all"), "node info": ("--include-hidden",), "param list": (_NODES,), "param get": (_NODES,),
     "param set": (_NODES,), "param describe": (_NODES,), "param dump": (_NODES,), "param load": (_NODES,),
 }  # fmt: skip
@@ -108,7 +109,9 @@ class Verb:
         if self._bus:
             connection.add_arguments(parser)
         if self.name.partition(" ")[0] in ("topic", "service", "action", "node", "param"):
-            _add_ros2_flags(parser, self.name)
+            _add_ros2_flags(parser, (*_EVERY, *_ROS2.get(self.name, ())))
+        elif self.name in _ROS2:
+            _add_ros2_flags(parser, _ROS2[self.name])
 
 
 class Noun:
@@ -216,9 +219,9 @@ def by_name(*verbs: Noun | Verb) -> dict[str, Any]:
     return table
 
 
-def _add_ros2_flags(parser: argparse.ArgumentParser, name: str) -> None:
+def _add_ros2_flags(parser: argparse.ArgumentParser, flags: Iterable[str]) -> None:
     group = parser.add_argument_group(ROS2_TITLE, "They have no effect here.")
-    for flag in (*_EVERY, *_ROS2.get(name, ())):
+    for flag in flags:
         option, _, value = flag.partition(" ")
         if value:
             choices = _POLICIES.get(option.removeprefix("--qos-"))

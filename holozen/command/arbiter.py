@@ -25,7 +25,7 @@ STOPPED = "stopped: by {by}; `holozen release` lets it drive again"
 LET_GO = "let go first: it commanded while another drove or the robot was stopped; send a stop{or_wait}"
 LATE = "late: it waited up to {age:.1f} s for the sim"
 OVERRULED = "overruled: {driver} drives"
-HELD = "held: a higher source took over; `{resume}` lets it drive again"
+HELD = "held: another source took over; `{resume}` lets it drive again"
 
 
 class CommandTime:
@@ -288,8 +288,8 @@ class Arbiter:
         rank, time = max(rank, PERSON), self.time.at(now)
         self.software_stop.refusal(source, rank, False, time, self._here(now, sent))
         driver = self._driver_at(time)
-        if driver and rank == driver.rank == PERSON and driver.source != source and not is_stop(driver.motion):
-            self.software_stop.overrule(source, rank, time)
+        if driver and driver.source != source:
+            self._overrule(source, rank, driver, time)
 
     def _here(self, now: float, sent: Sent | None) -> Sent:
         """When a command was sent, on our clock; while the sim is paused, it does not age, and nor does a silence."""
@@ -306,8 +306,7 @@ class Arbiter:
         if other and rank >= other.rank and not stops and now - other.sent <= COMMAND_SILENCE:
             if rank > other.rank:
                 self._hold(source, rank, new)
-            elif rank == PERSON and not is_stop(other.motion):
-                self.software_stop.overrule(source, rank, now)
+            self._overrule(source, rank, other, now)
             return OVERRULED.format(driver=other.source)
         if not stops and self._is_held(source, rank):
             if rank == PERSON:
@@ -315,8 +314,7 @@ class Arbiter:
             return HELD.format(resume=resume_command(self._robot))
         if other and (stops or rank < other.rank):
             self._hold(other.source, other.rank, new)
-            if other.rank == PERSON and not is_stop(other.motion):
-                self.software_stop.overrule(other.source, other.rank, now)
+            self._overrule(other.source, other.rank, other, now)
         if (rank < AUTOPILOT and not is_stop(motion)) or (other and stops and not is_stop(other.motion)):
             self.taken_at = real
         self._drive(new)
@@ -457,6 +455,11 @@ class Arbiter:
     def _is_held(self, source: str, rank: int) -> bool:
         autopilot = rank >= AUTOPILOT and rank > self._highest
         return autopilot or (rank in self._held and source in self._held[rank])
+
+    def _overrule(self, source: str, rank: int, driver: Driver, now: float) -> None:
+        """Let a person's source let go before it drives, if the `driver` is a person's too, and moves the robot."""
+        if rank == driver.rank == PERSON and not is_stop(driver.motion):
+            self.software_stop.overrule(source, rank, now)
 
     def _hold(self, source: str, rank: int, new: Driver) -> None:
         free = new.source if new.rank == rank and new.source != source else ""

@@ -13,22 +13,9 @@ from holozen.command.wait_set import Moment, ReadTimes, WaitSet
 from holozen.console import report
 from holozen.kinematics import travelled
 from holozen.limits import Planar
-from holozen.messages import (
-    CommandStatus,
-    Header,
-    Odometry,
-    Pose,
-    PoseWithCovariance,
-    Quaternion,
-    TFMessage,
-    Time,
-    Transform,
-    TransformStamped,
-    Twist,
-    TwistStamped,
-    TwistWithCovariance,
-    Vector3,
-)
+from holozen.messages import CommandStatus, Header, Odometry, TFMessage, Time, Twist, TwistStamped
+from holozen.odometry import odometry, transform
+from holozen.rotation import from_axis_angle
 from holozen.transport.graph import Endpoint, on_key
 from holozen.transport.pubsub import Subscription
 from holozen.wire import COMMAND_SILENCE, MAX_COMMAND_BYTES, key_for
@@ -132,13 +119,10 @@ class Base:
         (x, y, yaw), passed, self._moved_at = self._pose, now - self._moved_at, now
         dx, dy = travelled(measured, yaw, passed)
         self._pose = x, y, yaw = x + dx, y + dy, math.remainder(yaw + measured[2] * passed, math.tau)
-        turned = Quaternion(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
+        at, rotation = (x, y, 0.0), from_axis_angle((0.0, 0.0, 1.0), yaw)
         header = Header(Time.of(time.time()), self._frames[0])
-        pose = Pose.of((x, y, 0.0), (turned.x, turned.y, turned.z, turned.w))
-        self._odom.put(
-            Odometry(header, self._frames[1], PoseWithCovariance(pose), TwistWithCovariance(Twist.planar(*measured)))
-        )
-        self._tf.put(TFMessage([TransformStamped(header, self._frames[1], Transform(Vector3(x, y, 0.0), turned))]))
+        self._odom.put(odometry(header, self._frames[1], at, rotation, measured))
+        self._tf.put(TFMessage([transform(header, self._frames[1], at, rotation)]))
 
     def _other_servers(self) -> list[Endpoint]:
         """The robot's service `stop` in other processes: each request would reach one of them only."""

@@ -26,6 +26,7 @@ from typing import Any, NamedTuple, NoReturn, TypeVar
 import msgspec
 
 from holozen.console import report
+from holozen.process import SIGNALS
 from holozen.robot.errors import RobotError
 from holozen.robot.packages import VARIABLES, remember_folders
 from holozen.robot.sandbox import limit, restrict
@@ -148,8 +149,13 @@ class Server:
         if self._socket is not None and self._owner == os.getpid():
             return
         here, there = socket.socketpair()
-        if os.fork() == 0:
-            _serve(there)
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+        try:  # Python runs code of its own in the child first, and a Ctrl-C in there would print a traceback
+            signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+            if os.fork() == 0:
+                _serve(there, before)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
         there.close()
         self._socket, self._owner = here, os.getpid()
 
@@ -208,12 +214,14 @@ def _ended(code: int, seconds: int) -> str:
 # In the server process.
 
 
-def _serve(connection: socket.socket) -> NoReturn:
-    """Fork a process for each request, until the other end closes."""
+def _serve(connection: socket.socket, mask: set[signal.Signals | int]) -> NoReturn:
+    """Fork a process for each request, until the other end closes. `mask`: the signals to block, as the parent did."""
     try:
         os.setsid()  # Ctrl-C is for the parent
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        for number in SIGNALS:
+            signal.signal(number, signal.SIG_IGN)  # forget one that came before
             signal.signal(number, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         ctypes.CDLL(None).prctl(_PDEATHSIG, signal.SIGKILL)
         _keep_only(connection.fileno())
         gc.disable()  # objects of the parent, such as connections, must not be closed here

@@ -264,7 +264,8 @@ class Latest(Generic[M]):
 
     def __init__(self, subscription: Subscription[M]) -> None:
         self._subscription, self.raw = subscription, subscription.raw
-        self._newer = threading.Condition()
+        self._lock = threading.Lock()  # Ctrl-C just after a Condition has taken its lock would leave it locked
+        self._newer = threading.Condition(self._lock)
         self._arrivals: Arrivals[M] = Arrivals()
         self.bad = 0  # samples that could not be decoded
         threading.Thread(target=self._keep, daemon=True).start()
@@ -276,17 +277,17 @@ class Latest(Generic[M]):
 
     def read(self) -> tuple[M | None, float]:
         """The newest message (None before the first) and its age in seconds since it arrived."""
-        with self._newer:
+        with self._lock:
             return self._arrivals.newest, self._arrivals.age(time.monotonic())
 
     def patience(self, silence: float) -> float:
         """The age from which the newest is stale, see Arrivals."""
-        with self._newer:
+        with self._lock:
             return self._arrivals.patience(silence)
 
     def wait(self, after: int, timeout: float) -> bool:
         """Wait until more than `after` messages have arrived, at most `timeout` seconds; returns whether they have."""
-        with self._newer:
+        with self._lock:
             return self._newer.wait_for(lambda: self.count > after, timeout)
 
     def close(self) -> None:
@@ -299,7 +300,7 @@ class Latest(Generic[M]):
                 received: Received[Any] = self._subscription.recv()
             except BusError:
                 return
-            with self._newer:
+            with self._lock:
                 if received.message is None:
                     self.bad += 1
                     continue

@@ -480,22 +480,19 @@ class Gateway:
 class ConcurrentAnswers(Answers):
     """Answers each query in its own thread, as some take long; at most MANY at a time."""
 
-    def _run(self) -> None:
-        room = threading.BoundedSemaphore(MANY)
+    def __init__(self, queryable: Any, answer: Callable[[Any], None]) -> None:
+        self._room = threading.BoundedSemaphore(MANY)
+        super().__init__(queryable, answer)
 
-        def one(query: Any) -> None:
-            try:
-                self._handle(query)
-            finally:
-                room.release()
+    def _handle(self, query: Any) -> None:
+        self._room.acquire()  # waits while there are too many
+        threading.Thread(target=self._handle_one, args=(query,), daemon=True).start()
 
-        while True:
-            try:
-                query = self._queries.recv()
-            except Exception:  # as in RawSubscriber.recv
-                return
-            room.acquire()  # waits while there are too many
-            threading.Thread(target=one, args=(query,), daemon=True).start()
+    def _handle_one(self, query: Any) -> None:
+        try:
+            super()._handle(query)
+        finally:
+            self._room.release()
 
 
 def _refused(response: Interface, error: ServiceError) -> dict[str, Any] | None:

@@ -121,18 +121,18 @@ class Camera:
         )
         self._depth: Publisher[Image] | None = bus.publisher(first.depth, Image, wire="cdr") if first.depth else None
         self._info: Publisher[CameraInfo] = bus.publisher(first.info, CameraInfo)
+        self._all = [one for one in (self._image, self._compressed, self._depth, self._info) if one]
 
     @property
     def wanted(self) -> bool:
         """Whether anyone wants what `publish` sends."""
-        wanted = [one.wanted for one in (self._image, self._compressed, self._depth, self._info) if one]
+        wanted = [one.wanted for one in self._all]
         return any(wanted)
 
     def close(self) -> None:
         """Close the keys."""
-        for publisher in (self._image, self._compressed, self._depth, self._info):
-            if publisher:
-                publisher.close()
+        for publisher in self._all:
+            publisher.close()
 
     def publish(self, exposure: Exposure, renderer: Renderer) -> None:
         """Render and publish a picture."""

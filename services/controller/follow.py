@@ -210,7 +210,8 @@ class Follower:
                     return goal
                 self._report_hold(f"goal {number} is more than {MAX_DISTANCE:g} m away; waiting for another")
             except NoReply as silence:
-                self._report_hold(f"waiting for goal {number}: {silence}")
+                absence = self._absence()
+                self._report_hold(f"waiting for goal {number}: {silence}{'; ' * bool(absence)}{absence}")
             except ServiceError as failure:
                 self._report_hold(f"goal {number}: {failure}")
                 if number:  # the list got shorter: this lap is over
@@ -299,7 +300,13 @@ class Follower:
         return None
 
     def _no_odom(self) -> str:
-        """Why it waits for odom. If none came in NOTICE seconds since the start, it names the present robots."""
+        """Why it waits for odom."""
+        return f"waiting for {self._absence() or 'odom: it is stale, or none was received'}"
+
+    def _absence(self) -> str:
+        """That the robot is not there, with the present ones, if no odom came in NOTICE seconds since the start; else
+        empty.
+        """
         if self._odom.count:
             self._others = ""
         elif not self._others and time.monotonic() - self._began > NOTICE:
@@ -307,7 +314,7 @@ class Follower:
             names = [robot or "the one at the root of the keys" for robot in robots]
             name = self._robot or "robot"
             self._others = f"{name}: no node publishes its odom{suggest(name, names)}; there are: {listed(names)}"
-        return f"waiting for {self._others or 'odom: it is stale, or none was received'}"
+        return self._others
 
     def _command(self, planar: Planar) -> None:
         self._commands.put(Twist.planar(*planar))

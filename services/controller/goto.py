@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from holozen.kinematics import to_body
-from holozen.limits import Planar, clamp_speed, ramp, wrap
+from holozen.limits import Planar, clamp_speed, ramp
 
 CREEP, TURN_CREEP = 0.05, 0.1  # m/s, rad/s; slow enough to arrive without braking
 
@@ -31,7 +31,7 @@ class Gains:
 def error(pose: Pose, goal: Pose) -> Planar:
     """The goal in the body frame: forward, left, and the heading error within [-pi, pi]."""
     x, y = to_body(goal[0] - pose[0], goal[1] - pose[1], pose[2])
-    return x, y, wrap(goal[2] - pose[2])
+    return x, y, math.remainder(goal[2] - pose[2], math.tau)
 
 
 def arrived(left: Planar, now: Planar, gains: Gains) -> bool:

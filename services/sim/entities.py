@@ -14,7 +14,8 @@ from holozen.command.stop_services import RobotServices
 from holozen.command.wait_set import Moment, WaitSet
 from holozen.console import report
 from holozen.messages import Pose, SeenEntity
-from holozen.messages import simulation_interfaces as si
+from holozen.messages.simulation_interfaces import Result
+from holozen.messages.simulation_interfaces import SpawnEntityReply as Spawn
 from holozen.robot.errors import RobotError
 from holozen.robot.keys import command_key, keys_of, shared
 from holozen.robot.model import MOVING, Camera, RobotModel
@@ -110,7 +111,7 @@ class Entities:
         """The entity called `name`. Raises EntityError, which lists the names."""
         if name not in self._all:
             raise EntityError(
-                si.Result.NOT_FOUND, f"there is no entity {name[:80]!r}; the entities are {listed(list(self._all))}"
+                Result.NOT_FOUND, f"there is no entity {name[:80]!r}; the entities are {listed(self._all)}"
             )
         return self._all[name]
 
@@ -132,6 +133,7 @@ class Entities:
             entity = Entity(name, model, mover.body, place, prefix=prefix)
             if model.drive or mover.names or model.sensors:
                 phase = len(self.robots) % BURSTS / BURSTS
+                keep_stop = partial(self._keep_stop, _place_of(model, prefix))
                 entity.robot = Robot(
                     self._bus,
                     name,
@@ -142,7 +144,7 @@ class Entities:
                     self._clocks,
                     phase,
                     self.command_time,
-                    partial(self._keep_stop, _place_of(model, prefix)),
+                    keep_stop,
                 )
                 entity.robot.require_age(self.max_age)
                 if self._cameras and any(isinstance(sensor.device, Camera) for sensor in model.sensors):
@@ -170,7 +172,7 @@ class Entities:
         before = *entity.body.pose(), *entity.body.twist()
         self._world.put(entity.body, place, linear, angular)
         try:
-            self._check_place(name, entity.model, entity.body, si.Result.OPERATION_FAILED)
+            self._check_place(name, entity.model, entity.body, Result.OPERATION_FAILED)
         except EntityError:
             self._world.put(entity.body, before[:2], *before[2:])
             raise
@@ -250,11 +252,9 @@ class Entities:
             check_shapes(model)
             return mover_for(self._world, model, *place)
         except RobotError as error:
-            raise EntityError(si.SpawnEntityReply.RESOURCE_PARSE_ERROR, str(error)) from None
+            raise EntityError(Spawn.RESOURCE_PARSE_ERROR, str(error)) from None
 
-    def _check_place(
-        self, name: str, model: RobotModel, body: Body, code: int = si.SpawnEntityReply.INVALID_POSE
-    ) -> None:
+    def _check_place(self, name: str, model: RobotModel, body: Body, code: int = Spawn.INVALID_POSE) -> None:
         """Raise EntityError if a body is deep in the ground or in another one: the engine would throw it out. An entity
         of the same name does not count: either the name is refused, or that entity is replaced. With its root frame on
         the ground a body may be in it: programs that give no height send 0, wherever the root frame is.
@@ -367,27 +367,24 @@ class Entities:
         return next(name for name in names if name not in taken and (owns is None or owns(name)))
 
     def _check_names(self, name: str, prefix: str) -> None:
-        for text, code in ((name, si.SpawnEntityReply.NAME_INVALID), (prefix, si.SpawnEntityReply.NAMESPACE_INVALID)):
+        for text, code in ((name, Spawn.NAME_INVALID), (prefix, Spawn.NAMESPACE_INVALID)):
             try:
                 robot_name(text or "root")
             except ValueError as error:
                 raise EntityError(code, str(error)[:MAX_REASON]) from None
 
     def _check_unique(self, name: str, prefix: str, model: RobotModel) -> None:
-        if name in self._all:
-            there = listed(list(self._all))
-            raise EntityError(
-                si.SpawnEntityReply.NAME_NOT_UNIQUE, f"there is an entity {name!r} already; the entities are {there}"
-            )
-        if len(self._all) >= MAX_ENTITIES:
-            raise EntityError(
-                si.Result.OPERATION_FAILED,
-                f"there are {MAX_ENTITIES} entities, the most that are simulated; delete some",
-            )
         if has_keys(model):
             self._check_keys(name, model, prefix)
         if model.drive:
-            self._check_alone(key_for(model.drive.odometry_topic, prefix))
+            self._check_alone(name, key_for(model.drive.odometry_topic, prefix))
+        if name in self._all:
+            there = listed(self._all)
+            raise EntityError(Spawn.NAME_NOT_UNIQUE, f"there is an entity {name!r} already; the entities are {there}")
+        if len(self._all) >= MAX_ENTITIES:
+            raise EntityError(
+                Result.OPERATION_FAILED, f"there are {MAX_ENTITIES} entities, the most that are simulated; delete some"
+            )
 
     def _check_keys(self, name: str, model: RobotModel, prefix: str) -> None:
         """Raise EntityError if another robot, or the sim, has one of the keys: each would get the other's commands."""
@@ -398,22 +395,26 @@ class Entities:
             key = min(of_sim)
             problem = f"the robot's file puts {keys[key]} on the sim's own key {key!r}; give it another topic there"
         if problem:
-            raise EntityError(si.SpawnEntityReply.NAMESPACE_INVALID, problem)
-        if both := self._keys.keys() & keys.keys():
+            raise EntityError(Spawn.NAMESPACE_INVALID, problem)
+        if both := {key for key in self._keys.keys() & keys.keys() if self._keys[key] != name}:
             advice = f"delete that one, or use {'another' if prefix else 'a'} namespace"
             advice = "use another name" if prefix == name else advice
             problem = f"{min(both)} is the key of {self._keys[min(both)]!r}; {advice}"
-            raise EntityError(si.SpawnEntityReply.NAME_NOT_UNIQUE, problem)
+            raise EntityError(self._conflict(name), problem)
 
-    def _check_alone(self, key: str) -> None:
+    def _conflict(self, name: str) -> int:
+        """The code where another robot has a key. It is not that of a name that is taken where an entity of that name
+        would be replaced, since that one stays.
+        """
+        return Spawn.NAMESPACE_INVALID if name in self._all else Spawn.NAME_NOT_UNIQUE
+
+    def _check_alone(self, name: str, key: str) -> None:
         """Raise EntityError if another node publishes on the key: two sims would each get the other's commands."""
         if not self._graph.publishers(key):  # nearly always, and the graph of a fleet is large
             return
         for other in self.others_on(key, "pub"):
             problem = f"{key} is published by {other.node} ({other.session[:6]}) already"
-            raise EntityError(
-                si.SpawnEntityReply.NAME_NOT_UNIQUE, f"{problem}; end that one, or use another name: --robot FILE=NAME"
-            )
+            raise EntityError(self._conflict(name), f"{problem}; end that one, or use another name: --robot FILE=NAME")
 
 
 def _at(position: XYZ) -> str:
@@ -437,14 +438,10 @@ def has_keys(model: RobotModel) -> bool:
 def checked_place(position: XYZ, rotation: XYZW) -> Place:
     """A place that came over the wire, with its rotation normalized. Raises EntityError."""
     if not all(map(math.isfinite, (*position, *rotation))) or max(map(abs, position)) > MAX_DISTANCE:
-        raise EntityError(
-            si.SpawnEntityReply.INVALID_POSE, f"position {position}: use finite numbers up to {MAX_DISTANCE:g} m"
-        )
+        raise EntityError(Spawn.INVALID_POSE, f"position {position}: use finite numbers up to {MAX_DISTANCE:g} m")
     length = math.hypot(*rotation)
     if not 0.9 < length < 1.1:
-        raise EntityError(
-            si.SpawnEntityReply.INVALID_POSE, f"orientation {rotation} is not a unit quaternion x, y, z, w"
-        )
+        raise EntityError(Spawn.INVALID_POSE, f"orientation {rotation} is not a unit quaternion x, y, z, w")
     x, y, z, w = (part / length for part in rotation)
     return position, (x, y, z, w)
 

@@ -47,7 +47,7 @@ def _of_robot(robot: Robot) -> Iterator[Number]:
     yield Number(
         f"{place}command_timeout", "the robot stops after this long without a command", "s",
         *TIMEOUTS,
-        lambda: arbiter.timeout, lambda value: robot.set_timeout(value, time.monotonic()),
+        lambda: arbiter.timeout, lambda value: arbiter.set_timeout(value, time.monotonic()),
     )  # fmt: skip
     yield Number(
         f"{place}odometry_rate", "rate of odometry, in simulated time", "Hz", *RATES,

@@ -203,10 +203,6 @@ class Robot:
         for freshness in self._filters:
             freshness.max_age = limit
 
-    def set_timeout(self, timeout: float, now: float) -> None:
-        """Stop after `timeout` seconds without a command, from `now` on."""
-        self.arbiter.set_timeout(timeout, now)
-
     def forget(self, source: str, session: str) -> None:
         """Stop if `source` drives: its process, with this `session`, is gone. Its last commands have to be read before.
 

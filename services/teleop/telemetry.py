@@ -132,6 +132,7 @@ class Telemetry:
             obeyed=status.obeyed,
             held=status.held,
             stopped=status.stopped,
+            paused=client.odom.is_paused,
             sources=[Source(s.source, s.priority, s.rate, s.obeyed, s.held) for s in status.sources],
         )
 

@@ -54,6 +54,7 @@ class State:
     held: bool = False  # whether the autopilot is held until `resume`
     source: str = ""  # our own name
     stopped: str = ""  # source of the software stop
+    paused: bool = False  # whether the sim is
     pose: tuple[float, float, float] | None = None  # x, y, yaw in the frame of odom
     trail: Sequence[tuple[float, float]] = ()  # oldest first
     warning: str = ""  # the latest
@@ -125,6 +126,9 @@ def alarms(state: State) -> list[list[str]]:
         release = f"`holozen release{' ' * bool(state.robot)}{clean(state.robot, 64)}`"
         by = f"STOPPED by {clean(state.stopped, 40)}: {release}"
         found.append([f"{by} lets it drive again", by, f"STOPPED: {release}", "STOPPED"])
+    if state.paused:
+        play = "PAUSED: `holozen sim play`"
+        found.append([f"{play} continues the sim", play, "PAUSED"])
     if state.detached:
         found.append(["terminal detached: hands off; attach to it again to drive", "terminal detached: hands off"])
     if not state.listeners:

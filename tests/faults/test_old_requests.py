@@ -150,7 +150,6 @@ def test_holozen_release_that_was_begun_before_a_stop_leaves_the_robot_stopped(
         proxy.resume()
         assert release.wait() == 1
     assert release.out == ""
-    assert f"hb_bot is not released: this release may have been sent before the last stop of the robot{AGAIN}" in (
-        release.err
-    )
+    why = f"this release may have been sent before the last stop of the robot{AGAIN}"
+    assert f"holozen release: hb_bot is not released: {why}" in release.err
     assert wire.run("release").returncode == 0

@@ -224,3 +224,4 @@ def test_the_lists_leave_out_what_an_action_consists_of(town: Wire, verb: Verb) 
         assert "_action" not in verb(town, *words).stdout
         assert hidden in verb(town, *words, f"--include-hidden-{words[0]}s").stdout.splitlines()
     assert verb(town, "action", "list").stdout == "follow_waypoints\nnavigate_to_pose\nsimulate_steps\n"
+    assert verb(town, "action", "type", "/navigate_to_pose").stdout == "nav2_msgs/action/NavigateToPose\n"

@@ -213,7 +213,7 @@ def test_a_file_that_exists_is_not_written_over(wire: Wire, tmp_path: Path) -> N
 
 
 def test_keys_that_include_each_other_are_recorded_once(wire: Wire, tmp_path: Path) -> None:
-    recorder = wire.start("record", "a/b", "a/*", "a/b", "-o", str(tmp_path / "a"))
+    recorder = wire.start("record", "a/b", "--topics", "a/*", "a/b", "-o", str(tmp_path / "a"))
     listening(wire, "a/b").put("a/b", b"once")
     wait_for(lambda: read(tmp_path / "a.mcap"))
     recorder.signal(signal.SIGTERM)

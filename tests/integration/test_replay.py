@@ -23,6 +23,7 @@ from holozen.messages import (
     codec,
 )
 from holozen.testing import Wire, wait_for
+from holozen.transport.graph import on_key
 from holozen.transport.samples import RawSubscriber, Sample
 from tests.terminals.operators import BOX
 
@@ -221,6 +222,26 @@ def test_in_a_terminal_space_pauses_and_the_arrow_steps(wire: Wire, tmp_path: Pa
     assert terminal.process.wait() == 0
     assert terminal.modes() == terminal.modes_before
     assert [s.payload for s in heard(tap, count=3)] == [b"0", b"1", b"2"]
+
+
+def test_it_may_begin_with_a_pause(wire: Wire, tmp_path: Path) -> None:
+    rows = [("a", b"%d" % i, "", i * 50.0) for i in range(3)]
+    terminal = wire.terminal("bag", "play", "-p", bag(tmp_path / "a.mcap", *rows))
+    terminal.wait_for_text(", 0 messages; paused: space resumes")
+    terminal.type(" ")
+    terminal.wait_for_text("played 3 messages")
+    assert terminal.process.wait() == 0
+
+
+def test_it_may_wait_before_it_begins(wire: Wire, tmp_path: Path) -> None:
+    bus = wire.bus()
+    player = wire.start("bag", "play", "--delay", "1000", bag(tmp_path / "a.mcap", ("a", b"x", "", 0.0)))
+    wait_for(lambda: on_key(bus.endpoints(), "a", "pub"))
+    player.signal(signal.SIGINT)
+    assert player.wait() == 0
+    assert player.out.startswith("played 0 messages")
+    quick = wire.run("bag", "play", "-d", "0.1", str(tmp_path / "a.mcap"))
+    assert quick.stdout.startswith("played 1 messages")
 
 
 def test_a_pause_stops_the_robot(wire: Wire, tmp_path: Path) -> None:

@@ -163,6 +163,8 @@ def test_a_robot_is_not_spawned_into_another_nor_is_one_deleted_for_it(wire: Wir
     assert "no room for 'Bob' at x 0.6 y 0: it would be inside 'Fred'; the nearest free place is " in told
     assert told.endswith("; -x, -y and -z choose the place\n")
     assert "inside 'Ann'" in refused(wire, "spawn", HB_BOT, "--name", "Fred", "--replace", "-x", "5.5")
+    told = refused(wire, "spawn", HB_BOT, "--name", "Fred", "--replace", "--namespace", "Ann")
+    assert told == "holozen spawn: Ann/cmd_vel is the key of 'Ann'; delete that one, or use another namespace\n"
     told = refused(wire, "spawn", HB_BOT, "--name", "Zed", "-x", "20", "-z", "-1")
     assert "at x 20 y 0 z -1: it would be 0.96 m below the ground; the lowest free z is -0.04; -x, -y and -z " in told
     told = refused(wire, "spawn", HB_BOT, "--count", "2", "--grid", "1", "-y", "5")

@@ -114,6 +114,8 @@ VERBS = {
         silent=("next_goal --timeout 0.2", 1, "no reply from 'next_goal' within 0.2 s at "),
         endless=Endless("next_goal -r 20", "x_goal", 130)),
     "action list": row("", silent=("", 0, "no actions: no nodes found at ")),
+    "action type": row("simulate_steps", ("simulate_stps", 1, "did you mean 'simulate_steps'?"),
+        silent=("odom", *NO_KEY)),
     "action info": row("simulate_steps", ("simulate_stps", 1, "did you mean 'simulate_steps'?"),
         silent=("odom", *NO_KEY)),
     "action send_goal": row(None, ("simulate_steps '{{step: 1}}'", 1, "no field 'step' (did you mean 'steps'?)"),

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holozen.limits import Planar, clamp, clamp_speed, ramp, wrap
+from holozen.limits import Planar, clamp, clamp_speed, ramp
 
 numbers = st.floats(-1e6, 1e6)
 speeds = st.tuples(numbers, numbers, numbers)
@@ -65,11 +65,3 @@ def test_a_ramp_never_exceeds_the_acceleration_and_never_overshoots(
 @given(speeds, speeds)
 def test_a_ramp_with_room_arrives(now: Planar, wanted: Planar) -> None:
     assert ramp(now, wanted, linear=1e9, angular=1e9, dt=1) == pytest.approx(wanted, abs=1e-6)
-
-
-@given(st.floats(-1e4, 1e4))
-def test_a_wrapped_angle_is_the_same_angle_between_minus_pi_and_pi(angle: float) -> None:
-    wrapped = wrap(angle)
-    assert -math.pi <= wrapped <= math.pi
-    assert math.cos(wrapped) == pytest.approx(math.cos(angle), abs=1e-9)
-    assert math.sin(wrapped) == pytest.approx(math.sin(angle), abs=1e-9)

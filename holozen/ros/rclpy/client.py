@@ -15,7 +15,7 @@ from holozen.ros.rclpy.handle import NodeHandle, Owned, wrong_type
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import QoSProfile
 from holozen.ros.rclpy.task import Future, TaskQueue
-from holozen.ros.rclpy.waitable import deadline
+from holozen.ros.rclpy.waitable import Waker, deadline
 from holozen.transport.errors import BusError, NoReply, ServiceError
 
 __all__ = ["Client"]
@@ -42,7 +42,7 @@ class Client(Owned):
         self.srv_type, self.srv_name, self.qos_profile = srv_type, srv_name, qos_profile
         self.callback_group = callback_group
         self.tasks = TaskQueue(callback_group)  # the done callbacks of its futures
-        self._handle, self._closed = handle, threading.Event()
+        self._handle, self._is_closed = handle, False
         self._is_served = handle.bus.served(key(srv_name))
         self._threads: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
         self._pending: weakref.WeakSet[Future] = weakref.WeakSet()
@@ -69,7 +69,7 @@ class Client(Owned):
             left = min(POLL, deadline - time.monotonic())
             if left <= 0:
                 return False
-            self._closed.wait(left)
+            time.sleep(left)
         return True
 
     def call(self, request: Any, timeout_sec: float | None = None) -> Any:
@@ -98,7 +98,7 @@ class Client(Owned):
 
     def detach(self) -> None:
         """Stop calling; the bus is about to close."""
-        self._closed.set()
+        self._is_closed = True
 
     def destroy(self) -> None:
         """Stop calling, and cancel all pending requests."""
@@ -111,7 +111,7 @@ class Client(Owned):
         return list(self._threads)
 
     def _check_open(self) -> None:
-        if self._closed.is_set():
+        if self._is_closed:
             raise InvalidHandle(f"the client of {self.srv_name} was destroyed")
 
     def _call(self, request: Any, future: Future) -> None:
@@ -121,15 +121,15 @@ class Client(Owned):
         except (ServiceError, CodecError) as error:
             return future.set_exception(error)
         except Exception as error:
-            if not self._closed.is_set() and not isinstance(error, BusError):
+            if not self._is_closed and not isinstance(error, BusError):
                 return future.set_exception(error)
         future.cancel()
 
     def _reply(self, request: Any, future: Future) -> Any:
         """The reply to a request; None once its future is done or the client is closed."""
-        while not (future.done() or self._closed.is_set()):
+        while not (future.done() or self._is_closed):
             if not self._is_served():
-                self._closed.wait(POLL)
+                time.sleep(POLL)
                 continue
             with contextlib.suppress(NoReply):
                 return self._handle.bus.call(key(self.srv_name), request, self.srv_type.Response, LONGEST)
@@ -142,15 +142,15 @@ def wait_for_reply(future: Future, context: Context, name: str, timeout_sec: flo
     Raises its exception, TimeoutError, InvalidHandle if it is cancelled, and what `Publisher.publish` raises after a
     shutdown.
     """
-    done, end = threading.Event(), deadline(timeout_sec)
-    future.watch(done.set)
-    while not done.is_set():
+    waker, end = Waker(), deadline(timeout_sec)
+    future.watch(waker.wake)
+    while not future.done():
         left = min(LOOK, end - time.monotonic())
         if left <= 0:
             future.cancel()
             raise TimeoutError(f"no reply from {name} within {timeout_sec:g} s")
         context.check_can_publish(f"call {name}")
-        done.wait(left)
+        waker.wait(left)
     if future.cancelled():
         raise InvalidHandle(f"the client of {name} was destroyed while it waited for the reply")
     return future.result()

@@ -104,15 +104,16 @@ class _Moves:
 
     def __init__(self) -> None:
         self.count = 0
-        self._more = threading.Condition()
+        self._lock = threading.Lock()  # see holozen.ros.rclpy.waitable
+        self._more = threading.Condition(self._lock)
 
     def notify(self) -> None:
-        with self._more:
+        with self._lock:
             self.count += 1
             self._more.notify_all()
 
     def wait(self, seen: int, seconds: float | None) -> None:
-        with self._more:
+        with self._lock:
             self._more.wait_for(lambda: self.count != seen, seconds)
 
 

@@ -7,6 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from functools import partial
+from queue import SimpleQueue
 from typing import Any, Self
 
 from holozen.ros.catalog import HelpfulAttributes
@@ -268,8 +269,7 @@ class MultiThreadedExecutor(Executor):
         self._most = max(2, os.cpu_count() or 2) if num_threads is None else num_threads
         if self._most < 1:
             raise ValueError(f"num_threads is {num_threads}; use 1 or more")
-        self._work: deque[Work] = deque()
-        self._available = threading.Semaphore(0)  # counts `_work`
+        self._work: SimpleQueue[Work | None] = SimpleQueue()  # None ends a thread
         self._threads: list[threading.Thread] = []
         self._busy = 0
         self._lock = threading.Lock()
@@ -280,7 +280,7 @@ class MultiThreadedExecutor(Executor):
         super().shutdown()
         deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
         for _ in self._threads:
-            self._available.release()
+            self._work.put(None)
         others = [thread for thread in self._threads if thread is not threading.current_thread()]
         for thread in others:
             thread.join(None if deadline is None else max(0.0, deadline - time.monotonic()))
@@ -302,13 +302,12 @@ class MultiThreadedExecutor(Executor):
             thread = threading.Thread(target=self._serve, daemon=True)
             self._threads.append(thread)
             thread.start()
-        self._work.append((waitable, work))
-        self._available.release()
+        self._work.put((waitable, work))
 
     def _serve(self) -> None:
-        while self._available.acquire() and self._work:
+        while work := self._work.get():
             try:
-                self._run(*self._work.popleft())
+                self._run(*work)
             except BaseException as error:  # raised again in the spinning thread
                 self._errors.append(error)
             with self._lock:

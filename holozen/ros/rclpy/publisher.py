@@ -2,12 +2,18 @@
 
 from typing import Any
 
+from holozen.command.feedback import VELOCITIES, CommandFeedback
+from holozen.messages import CommandStatus
+from holozen.messages.codec import decoder
 from holozen.ros.rclpy.callback_groups import CallbackGroup
 from holozen.ros.rclpy.exceptions import InvalidHandle
 from holozen.ros.rclpy.handle import NodeHandle, Owned, wrong_type
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import HistoryPolicy, QoSProfile
+from holozen.transport.bus import LARGEST_STATE
 from holozen.transport.graph import subscribers
+from holozen.transport.pubsub import Latest, Subscription
+from holozen.wire import is_command
 
 __all__ = ["Publisher"]
 
@@ -15,7 +21,8 @@ __all__ = ["Publisher"]
 class Publisher(Owned):
     """Created by `Node.create_publisher`. Sends with Zenoh's priority DATA; late subscribers can get the last message.
 
-    Messages are dropped where a link is full; with a history of KEEP_ALL the publisher waits instead.
+    Messages are dropped where a link is full; with a history of KEEP_ALL the publisher waits instead. One of velocity
+    commands logs a warning when the robot stops obeying them, with the reason, and when it obeys again.
     """
 
     def __init__(self, handle: NodeHandle, msg_type: Any, topic: str, qos_profile: QoSProfile) -> None:
@@ -24,6 +31,9 @@ class Publisher(Owned):
         block = qos_profile.history == HistoryPolicy.KEEP_ALL
         self._writer: Any = handle.bus.publisher(key(topic), msg_type, block=block)
         self.callback_group: CallbackGroup | None = None
+        self._feedback = (
+            self._listen() if msg_type.ROS in VELOCITIES and is_command(key(topic), (msg_type.ROS,)) else None
+        )
 
     @property
     def topic_name(self) -> str:
@@ -47,6 +57,10 @@ class Publisher(Owned):
             if self._writer is None:  # another thread has destroyed it
                 raise InvalidHandle(f"the publisher of {self.topic} was destroyed") from None
             raise
+        if self._feedback:
+            if not isinstance(msg, bytes):
+                self._feedback.strafes |= getattr(msg, "twist", msg).linear.y != 0
+            self._feedback.look()
 
     def get_subscription_count(self) -> int:
         """How many subscriptions receive what is sent now; 1 if only programs that are not holozen nodes do."""
@@ -62,6 +76,16 @@ class Publisher(Owned):
         """Always true: Zenoh has accepted everything that `publish` was given."""
         return True
 
+    def _listen(self) -> CommandFeedback:
+        def report(text: str) -> None:
+            self._handle.logger.warning(f"{self.topic}: {text}")
+
+        bus, status = self._handle.bus, f"{key(self.topic)}_status"
+        # Not announced: ROS's publishers read nothing.
+        samples = bus.subscribe_raw(status, depth=1, limit=LARGEST_STATE)
+        self._status = Latest(Subscription(samples, decoder((CommandStatus,), tolerant=True)))
+        return CommandFeedback(bus.source, status, self._status, report=report)
+
     def detach(self) -> None:
         """Stop sending; the bus is about to close."""
         self._writer = None
@@ -71,3 +95,5 @@ class Publisher(Owned):
         writer, self._writer = self._writer, None
         if writer is not None:
             writer.close()
+            if self._feedback:
+                self._status.close()

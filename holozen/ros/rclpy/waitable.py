@@ -2,6 +2,9 @@
 
 No work is done in Zenoh's threads. Samples wait in a ring channel, which costs no Python at all. Only while an executor
 blocks, one thread per inbox waits in the ring's `recv` and wakes it.
+
+In all that a script's main thread runs, bare locks and SimpleQueue stand where Condition, Event and Semaphore might:
+Ctrl-C in the instant in which one of those has just taken its lock leaves it locked, and the script would not end.
 """
 
 import math
@@ -9,6 +12,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from queue import SimpleQueue
 from typing import Any, Generic, TypeVar
 
 from holozen.ros.rclpy.callback_groups import CallbackGroup
@@ -83,7 +87,7 @@ class Inbox(Generic[T]):
         self._waker = Waker()
         self._lock = threading.Lock()  # protects `parked`
         self.parked = True  # while the thread is parked, `take` reads the ring itself
-        self._go = threading.Semaphore(0)
+        self._go: SimpleQueue[None] = SimpleQueue()  # an item for each time that the thread may wait in the ring
         self.thread: threading.Thread | None = None
         self._closed = False
 
@@ -104,20 +108,23 @@ class Inbox(Generic[T]):
         if self.thread is None:
             self.thread = threading.Thread(target=self._read, daemon=True)
             self.thread.start()
-        self._go.release()
+        self._go.put(None)
 
     def close(self) -> None:
         """Let the thread end. If it waits in the ring, the end of the ring ends it."""
         with self._lock:
             self._closed = True
-        self._go.release()
+        self._go.put(None)
 
     def _drain(self) -> None:
         while (item := self._try_recv()) is not None:
             self._items.append(item)
 
     def _read(self) -> None:
-        while self._go.acquire() and not self._closed:
+        while True:
+            self._go.get()
+            if self._closed:
+                return
             while self._receive():
                 pass
 

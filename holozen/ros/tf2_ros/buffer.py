@@ -68,7 +68,8 @@ class Buffer(HelpfulAttributes):
 
     def __init__(self, cache_time: Duration | None = None, node: Any = None) -> None:
         self._core = BufferCore(cache_time.nanoseconds if cache_time else CACHE_TIME)
-        self._changed = threading.Condition()
+        self._lock = threading.RLock()  # see holozen.ros.rclpy.waitable
+        self._changed = threading.Condition(self._lock)
         self._waiting: list[tuple[Callable[[], Any], Future]] = []
         self.node = node
 
@@ -132,18 +133,18 @@ class Buffer(HelpfulAttributes):
 
     def clear(self) -> None:
         """Forget everything but static transforms."""
-        with self._changed:
+        with self._lock:
             self._core.clear()
 
     def all_frames_as_string(self) -> str:
         """Every frame and its parent, one line each."""
-        with self._changed:
+        with self._lock:
             found = self._core.histories()
         return "".join(f"Frame {child} exists with parent {each.parent(0)}.\n" for child, each in sorted(found.items()))
 
     def all_frames_as_yaml(self) -> str:
         """Every frame with its parent, and the times of its first and last transform in seconds."""
-        with self._changed:
+        with self._lock:
             found = self._core.histories()
         lines = []
         for child, each in sorted(found.items()):
@@ -155,7 +156,7 @@ class Buffer(HelpfulAttributes):
     def _put(self, transform: Any, static: bool) -> None:
         rigid = Transform.of(transform.transform.translation, transform.transform.rotation)
         header = transform.header
-        with self._changed:
+        with self._lock:
             self._core.put(header.frame_id, transform.child_frame_id, nanoseconds(header.stamp), rigid, static)
             self._changed.notify_all()
             waiting, self._waiting = self._waiting, []
@@ -164,7 +165,7 @@ class Buffer(HelpfulAttributes):
 
     def _within(self, timeout: Any, look: Callable[[], Any]) -> Any:
         deadline = clock.monotonic() + (nanoseconds(timeout) / 1e9 if timeout is not None else 0.0)
-        with self._changed:
+        with self._lock:
             while True:
                 try:
                     return look()
@@ -185,7 +186,7 @@ class Buffer(HelpfulAttributes):
     def _try(self, look: Callable[[], Any], future: Future) -> None:
         if future.cancelled():
             return
-        with self._changed:
+        with self._lock:
             try:
                 found = look()
             except InvalidArgumentException as error:  # waiting does not help

@@ -5,7 +5,6 @@ import math
 import re
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -25,6 +24,8 @@ from holozen.messages import (
 )
 from holozen.messages import simulation_interfaces as si
 from holozen.messages.message import not_finite
+from holozen.messages.simulation_interfaces import Result
+from holozen.messages.simulation_interfaces import SpawnEntityReply as Spawn
 from holozen.robot.description import written
 from holozen.robot.errors import RobotError
 from holozen.robot.loading import received
@@ -43,15 +44,7 @@ MAX_PARSED = 8  # texts whose models are kept, for a fleet, or a robot that is s
 MAX_WARNINGS = 20  # about a robot's text in a reply
 MAX_TAGS = 20_000  # "<" in a text; parsing more of them would stall the steps
 WORLD = ("", "world", "odom", "map")  # frames that mean the world
-_OK = si.Result(si.Result.OK)
-
-
-@dataclass(frozen=True, slots=True)
-class Parsed:
-    """The model of a text, which may be reused `until` a time in s (monotonic)."""
-
-    model: RobotModel
-    until: float
+_OK = Result(Result.OK)
 
 
 class EntityServices:
@@ -71,15 +64,15 @@ class EntityServices:
         share: Share | None = None,
     ) -> None:
         self._entities, self._packages, self._share = entities, packages, share
-        self._parsed: dict[bytes, Parsed] = {}
+        self._parsed: dict[bytes, tuple[RobotModel, float]] = {}  # by hash; until when (s) a model may be reused
         serve = partial(bus.serve, shared=share is not None)
         self._servers = [
             serve("delete_entity", si.DeleteEntityRequest, si.DeleteEntityReply, self.delete),
             serve("get_entities", si.GetEntitiesRequest, si.GetEntitiesReply, self.names),
             serve("get_entity_state", si.GetEntityStateRequest, si.GetEntityStateReply, self.state),
             serve("set_entity_state", si.SetEntityStateRequest, si.SetEntityStateReply, self.put),
+            serve("get_scene", GetSceneRequest, GetSceneReply, self.scene),
         ]
-        self._servers.append(serve("get_scene", GetSceneRequest, GetSceneReply, self.scene))
         # From a thread of its own: a text with large meshes takes longer than a step.
         serve("robot_description", RobotDescriptionRequest, RobotDescriptionReply, self.description).start()
         if spawns:
@@ -108,7 +101,7 @@ class EntityServices:
         for warning in model.warnings:
             report(f"sim: warning: {name}: {warning}")
         report(f"sim: {name} was added to the world")
-        return si.SpawnEntityReply(si.Result(si.Result.OK, _warned(model.warnings)), entity.name)
+        return si.SpawnEntityReply(Result(Result.OK, _warned(model.warnings)), entity.name)
 
     def _named(self, name: str) -> Entity:
         """An entity of this sim. Each shard has all objects of the world file, and of the rest only its own."""
@@ -119,35 +112,33 @@ class EntityServices:
     def _check_share(self, name: str) -> None:
         """Raise Elsewhere if the name belongs to another shard, and EntityError if that one does not run."""
         if self._share and (problem := self._share.refusal(name)):
-            raise EntityError(si.Result.OPERATION_FAILED, problem)
+            raise EntityError(Result.OPERATION_FAILED, problem)
 
     def _read(self, request: si.SpawnEntityRequest) -> RobotModel:
         """The model in a request. No expression in it is evaluated, and only files of known packages are opened."""
         text, now = request.resource_string, time.monotonic()
         key = hashlib.sha256(text.encode()).digest()
-        if key in self._parsed and now < self._parsed[key].until:
-            return self._parsed[key].model
+        model, until = self._parsed.get(key, (None, 0.0))
+        if model and now < until:
+            return model
         if not text:
             problem = "resource_string is empty; it holds the URDF or SDF text, as `holozen spawn FILE` sends it"
-            raise EntityError(
-                si.SpawnEntityReply.UNSUPPORTED_ASSETS if request.uri else si.SpawnEntityReply.NO_RESOURCE, problem
-            )
+            raise EntityError(Spawn.UNSUPPORTED_ASSETS if request.uri else Spawn.NO_RESOURCE, problem)
         if text.count("<") > MAX_TAGS:
             problem = f"resource_string has more than {MAX_TAGS // 2} elements; a robot may have no more"
-            raise EntityError(si.SpawnEntityReply.RESOURCE_PARSE_ERROR, problem)
+            raise EntityError(Spawn.RESOURCE_PARSE_ERROR, problem)
         if uses_xacro(text):
             raise EntityError(
-                si.SpawnEntityReply.UNSUPPORTED_FORMAT,
-                "resource_string is xacro; expand it first: `holozen xacro FILE`",
+                Spawn.UNSUPPORTED_FORMAT, "resource_string is xacro; expand it first: `holozen xacro FILE`"
             )
         try:
             model = received(text, self._packages)
         except RobotError as error:
-            raise EntityError(si.SpawnEntityReply.RESOURCE_PARSE_ERROR, str(error)) from None
+            raise EntityError(Spawn.RESOURCE_PARSE_ERROR, str(error)) from None
         shapes = (shape for link in model.links.values() for shape in (*link.collisions, *link.visuals))
         lasting = not model.warnings and not any(shape.path for shape in shapes)
         self._parsed = dict([*self._parsed.items()][1 - MAX_PARSED :])
-        self._parsed[key] = Parsed(model, math.inf if lasting else time.monotonic() + REUSED)
+        self._parsed[key] = model, math.inf if lasting else time.monotonic() + REUSED
         return model
 
     def delete(self, request: si.DeleteEntityRequest) -> si.DeleteEntityReply:
@@ -161,9 +152,9 @@ class EntityServices:
         """The names that match the filter."""
         filters = request.filters
         if filters.categories or filters.tags.tags or filters.bounds.type:
-            raise EntityError(si.Result.FEATURE_UNSUPPORTED, "entities are filtered by name only: filters.filter")
+            raise EntityError(Result.FEATURE_UNSUPPORTED, "entities are filtered by name only: filters.filter")
         if len(filters.filter) > 100:
-            raise EntityError(si.Result.OPERATION_FAILED, "filters.filter is longer than 100 characters")
+            raise EntityError(Result.OPERATION_FAILED, "filters.filter is longer than 100 characters")
         names = [entity.name for entity in self._entities]
         return si.GetEntitiesReply(_OK, entities=_matching(names, filters.filter))
 
@@ -192,10 +183,10 @@ class EntityServices:
         linear, angular = _vector(state.twist.linear), _vector(state.twist.angular)
         if not_finite(state.twist) or max(map(abs, (*linear, *angular))) > MAX_SPEED:
             raise EntityError(
-                si.Result.OPERATION_FAILED, f"twist {linear}, {angular}: use at most {MAX_SPEED:g} m/s and rad/s"
+                Result.OPERATION_FAILED, f"twist {linear}, {angular}: use at most {MAX_SPEED:g} m/s and rad/s"
             )
         if entity.model.static and any((*linear, *angular)):
-            raise EntityError(si.Result.OPERATION_FAILED, f"{request.entity!r} is static; its velocity cannot be set")
+            raise EntityError(Result.OPERATION_FAILED, f"{request.entity!r} is static; its velocity cannot be set")
         self._entities.put(entity.name, place, linear, angular)
         return si.SetEntityStateReply(_OK)
 
@@ -216,20 +207,18 @@ def _matching(names: list[str], wanted: str) -> list[str]:
     """The names that a pattern matches. Only `*`, `.`, `|`, `^`, `$` are special: with others a match may never end."""
     if not re.fullmatch(r"[\w.*|^$-]*", wanted) or "**" in wanted or wanted.count("*") > 3:
         raise EntityError(
-            si.Result.FEATURE_UNSUPPORTED, f"filter {wanted!r}: use letters, digits, '_', '-', '.', '*', '|', '^', '$'"
+            Result.FEATURE_UNSUPPORTED, f"filter {wanted!r}: use letters, digits, '_', '-', '.', '*', '|', '^', '$'"
         )
     try:
         pattern = re.compile(wanted)
     except re.error as error:
-        raise EntityError(si.Result.OPERATION_FAILED, f"filter {wanted!r}: {error}") from None
+        raise EntityError(Result.OPERATION_FAILED, f"filter {wanted!r}: {error}") from None
     return [name for name in names if pattern.search(name)]
 
 
 def _place(header: Header, pose: Pose) -> Place:
     if header.frame_id not in WORLD:
-        raise EntityError(
-            si.SpawnEntityReply.INVALID_POSE, f"frame {header.frame_id[:80]!r}: give the pose in the frame 'world'"
-        )
+        raise EntityError(Spawn.INVALID_POSE, f"frame {header.frame_id[:80]!r}: give the pose in the frame 'world'")
     place = Transform.of(pose.position, pose.orientation)
     return checked_place(place.translation, place.rotation)
 

@@ -14,22 +14,17 @@ from holozen.messages import (
     Header,
     JointState,
     Odometry,
-    Pose,
-    PoseWithCovariance,
-    Quaternion,
     TFMessage,
     Time,
-    Transform,
     TransformStamped,
     Twist,
     TwistStamped,
-    TwistWithCovariance,
-    Vector3,
 )
+from holozen.odometry import odometry, transform
 from holozen.robot.model import Drive, Mecanum, Omni, RobotModel
 from holozen.robot.model import Planar as PlanarDrive
 from holozen.robot.rigid import moved_by
-from holozen.rotation import XYZ, XYZW, conjugate, from_axis_angle, multiply, rotate
+from holozen.rotation import conjugate, from_axis_angle, multiply, rotate
 from holozen.transport.pubsub import Publisher, Subscription
 from holozen.wire import MAX_COMMAND_BYTES, key_for
 
@@ -82,21 +77,6 @@ def covariance(drive: Drive) -> list[float]:
     x, y, yaw = drive.covariance
     diagonal = (x, y, UNKNOWN, UNKNOWN, UNKNOWN, yaw)
     return [diagonal[row] if row == column else 0.0 for row in range(6) for column in range(6)]
-
-
-def odometry(
-    header: Header, child: str, position: XYZ, rotation: XYZW, velocity: Planar, variances: list[float]
-) -> Odometry:
-    """Odometry with a pose in the frame of `header` and a velocity in the body frame `child`."""
-    pose = Pose.of(position, rotation)
-    return Odometry(
-        header, child, PoseWithCovariance(pose, variances), TwistWithCovariance(Twist.planar(*velocity), variances)
-    )
-
-
-def transform(header: Header, child: str, position: XYZ, rotation: XYZW) -> TransformStamped:
-    """The pose of the frame `child` in the frame of `header`."""
-    return TransformStamped(header, child, Transform(Vector3(*position), Quaternion(*rotation)))
 
 
 class JointFrames:

@@ -5,7 +5,7 @@ present too, which have no contacts in the engine that moves them.
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,25 +13,12 @@ from holozen.robot.model import RobotModel
 from holozen.robot.rigid import Frame, placed_shape
 from holozen.rotation import XYZ, XYZW, rotate
 
+from ..link_states import LinkState
 from .engine import Array, Rays
 
 Pose = tuple[XYZ, XYZW]
 TOUCHING = 2e-3  # m; nearer links count as touching: the engine that moves them keeps them apart by less
 GROUND = ("ground_plane", "link")
-
-
-class Placed(Protocol):
-    """Where a link is."""
-
-    @property
-    def xyz(self) -> XYZ:
-        """Its position in metres."""
-        ...
-
-    @property
-    def rotation(self) -> XYZW:
-        """Its rotation."""
-        ...
 
 
 class Touch(NamedTuple):
@@ -72,7 +59,7 @@ class RayCaster:
         """Whether the root of an entity is not where it was last placed."""
         return self._roots.get(name) != root
 
-    def place(self, name: str, root: Pose, links: Mapping[str, Placed]) -> None:
+    def place(self, name: str, root: Pose, links: Mapping[str, LinkState]) -> None:
         """Move the links of an entity."""
         self._roots[name] = root
         for link, body in self._bodies[name].items():

@@ -12,7 +12,6 @@ import re
 import struct
 from collections.abc import Iterator, Mapping
 from collections.abc import Set as AbstractSet
-from types import TracebackType
 
 from holozen.console import printable
 
@@ -239,9 +238,7 @@ class Joystick:
     def __enter__(self) -> "Joystick":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.close()
 
     def close(self) -> None:

@@ -30,6 +30,19 @@ def test_plot_reports_what_it_drew(tmp_path: Path, capsys: pytest.CaptureFixture
     assert (tmp_path / "b.svg").exists()
 
 
+def test_a_bag_may_be_named_as_it_was_recorded(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """`record -o v1.2` writes v1.2.mcap."""
+    path = a_bag(tmp_path / "v1.2.mcap")
+    assert main(["bag", "info", str(tmp_path / "v1.2"), "--json"]) == 0
+    assert main(["bag", "info", str(path), "--json"]) == 0
+    first, second = map(json.loads, capsys.readouterr().out.splitlines())
+    assert first == second
+    assert main(["bag", "plot", str(tmp_path / "v1.2")]) == 0
+    assert (tmp_path / "v1.2.png").exists()
+    (tmp_path / "v1.2").write_text("hello")
+    assert main(["bag", "info", str(tmp_path / "v1.2")]) == 1  # what has that very name comes first
+
+
 def test_a_wrong_file_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "a.mcap").write_text("hello")
     for verb in ["info", "plot"]:

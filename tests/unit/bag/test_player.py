@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 
 import pytest
 from hypothesis import given
@@ -43,11 +44,12 @@ class Pressed:
 class Played:
     """A player and what it did."""
 
-    def __init__(self, *keys: str, rate: float = 1.0, slow: float = 0.0) -> None:
+    def __init__(self, *keys: str, rate: float = 1.0, slow: float = 0.0, paused: bool = False) -> None:
         self.done: list[str] = []
         self.slow = slow  # s that it takes to publish
         self.stop, self.keys = threading.Event(), Pressed(*keys)
-        self.player = Player(self._publish, lambda: self.done.append("hold"), self.keys.read, self.stop, rate)
+        hold = partial(self.done.append, "hold")
+        self.player = Player(self._publish, hold, self.keys.read, self.stop, rate, paused=paused)
         self.end_after = 10**9
 
     def _publish(self, message: Message) -> bool:
@@ -126,6 +128,14 @@ def test_a_pause_holds_the_robots_and_each_step_plays_one_message() -> None:
     played.end_after = 4
     assert not played.player.play(messages(0, 3_600_000, 7_200_000, 10_800_000))
     assert played.done == ["0", "hold", "3600000", "7200000"]
+
+
+def test_one_that_begins_paused_plays_by_steps_until_it_goes_on_from_there() -> None:
+    played = Played("wait", STEP, STEP, PAUSE, paused=True)
+    begun = time.monotonic()
+    assert played.player.play(messages(0, 3_600_000, 3_600_100))
+    assert time.monotonic() - begun >= 0.1 + LOOK
+    assert played.done == ["0", "3600000", "3600100"]
 
 
 def test_a_step_without_a_pause_does_nothing() -> None:

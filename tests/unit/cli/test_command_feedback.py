@@ -3,8 +3,12 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
+import pytest
+
+from holozen.background import background
 from holozen.bus import Bus
-from holozen.cli.publish import HELD, LEFT, verdict, verdict_on_part
+from holozen.cli.publish import LEFT
+from holozen.command.feedback import HELD, ONLY_TURNS, verdict, verdict_on_part
 from holozen.messages import CommandSource, CommandStatus, Twist
 from holozen.testing import Wire, wait_for
 
@@ -51,8 +55,8 @@ def test_a_command_to_a_joint_that_is_accepted_after_a_refusal_is_obeyed() -> No
         assert verdict_on_part(status, before, ME) == why
 
 
-def once(wire: Wire, run: Run, judged: Callable[[str], CommandStatus]) -> str:
-    """What `pub --once` reports beside a sim that the teleop drives, and whose next status `judged` gives."""
+def once(wire: Wire, run: Run, judged: Callable[[str], CommandStatus], value: str = "{}") -> str:
+    """What `pub --once` reports of a value beside a sim that the teleop drives, whose next status `judged` gives."""
     sim: Bus = wire.bus("sim")
     commands, statuses = sim.subscribe("cmd_vel", Twist), sim.publisher("cmd_vel_status", CommandStatus)
     statuses.put(CommandStatus(obeyed=TELEOP))
@@ -64,7 +68,7 @@ def once(wire: Wire, run: Run, judged: Callable[[str], CommandStatus]) -> str:
 
     with ThreadPoolExecutor() as pool:
         answered = pool.submit(answer)
-        code, _, err = run("topic", "pub", "cmd_vel", "{}", "--once")
+        code, _, err = run("topic", "pub", "cmd_vel", value, "--once")
         answered.result(10)
     sim.close()  # the next command is not for it
     assert code == 0
@@ -90,6 +94,36 @@ def test_a_single_command_that_is_not_obeyed_is_reported(wire: Wire, run: Run) -
     assert reported().splitlines()[-1] == f"not obeyed: {teleop.source} drives{LEFT}"
 
 
+@pytest.mark.parametrize("stamped", [False, True])
+def test_a_sideways_command_to_a_robot_that_cannot_strafe_is_noted(wire: Wire, run: Run, stamped: bool) -> None:
+    def reported(value: str, strafes: bool) -> list[str]:
+        text = f"{{twist: {value}}}" if stamped else value
+        return once(wire, run, lambda source: CommandStatus(source, strafes=strafes), text).splitlines()
+
+    assert reported("{linear: {y: 0.2}}", False)[1:] == [ONLY_TURNS]
+    assert reported("{linear: {y: 0.2}}", True)[1:] == []
+    assert reported("{linear: {x: 0.2}}", False)[1:] == []
+
+
 def test_a_single_command_that_is_held_is_reported_with_what_lets_it_drive(wire: Wire, run: Run) -> None:
     reported = once(wire, run, lambda source: CommandStatus(sources=[CommandSource(source, held=True)]))
     assert reported.splitlines()[-1] == f"not obeyed: {HELD}; `holozen controller --resume` lets it drive again"
+
+
+def test_a_stop_at_the_end_that_holds_another_source_is_reported(wire: Wire, run: Run) -> None:
+    sim, teleop = wire.bus("sim"), wire.bus("teleop")
+    teleop.publisher("cmd_vel", Twist)
+    commands, statuses = sim.subscribe("cmd_vel", Twist), sim.publisher("cmd_vel_status", CommandStatus)
+
+    def answer() -> None:
+        while (command := commands.recv()).message is not None:
+            stops = command.message == Twist()
+            sources = [CommandSource(command.source), CommandSource(teleop.source, held=stops)]
+            statuses.put(CommandStatus("" if stops else teleop.source, sources=sources))
+
+    background(answer)
+    _, _, err = run("topic", "pub", "cmd_vel", "{linear: {x: 0.2}}", "--times", "2")
+    assert err.splitlines()[1:] == [
+        f"not obeyed: {teleop.source} drives",
+        f"{teleop.source} is held now, as by any stop of an equal; `holozen controller --resume` lets it drive again",
+    ]

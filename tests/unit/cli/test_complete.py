@@ -49,6 +49,7 @@ def test_what_the_parsers_know_is_completed(complete: Complete) -> None:
         (["to"], ["topic"]),
         (["topic", "e"], ["echo"]),
         (["topic", "echo", "odom", "--fi"], ["--field", "--filter"]),
+        (["topic", "echo", "odom", "--flow"], []),
         (["topic", "list", "--mode", ""], ["peer", "client", "router"]),
         (["completion", ""], ["bash", "zsh", "fish"]),
         (["pose-service", "--shape", "sq"], ["square"]),

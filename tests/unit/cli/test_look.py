@@ -174,7 +174,7 @@ def test_a_plot_of_a_key_that_no_node_has_names_the_nearest(sim: Bus, run: Run, 
 def test_without_nodes_a_verb_explains_how_to_start_some(run: Run, wire: Wire) -> None:
     for words, start in [
         ("topic echo odom --timeout 0.1", "holozen topic echo: no messages on odom within 0.1 s"),
-        ("topic pub cmd_vel {} --once --max-wait 0.1", "no subscribers of cmd_vel"),
+        ("topic pub cmd_vel {} --once --max-wait 0.1", "holozen topic pub: no subscribers of cmd_vel"),
         ("plot odom.x --json --once -w 0.1", "holozen plot: no messages on odom"),
         ("topic hz odom --timeout 0.1", "holozen topic hz: no messages on odom within 0.1 s"),
     ]:

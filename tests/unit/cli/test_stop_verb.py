@@ -186,7 +186,7 @@ def test_one_that_does_not_answer_holds_up_no_other_and_is_reported(robots: Robo
         """False where a busy machine met one of them too late."""
         code, out, err = run("stop", "--timeout", "0.8")
         assert code == 1 and "Ann" not in out
-        return (out, err) == ("Fred is stopped\n", "Ann did not confirm within 0.8 s; it may move\n")
+        return (out, err) == ("Fred is stopped\n", "holozen stop: Ann did not confirm within 0.8 s; it may move\n")
 
     def is_reported_as_json() -> bool:
         code, out, _ = run("stop", "Ann", "--timeout", "0.8", "--json")
@@ -234,7 +234,7 @@ def test_a_robot_that_refuses_is_asked_again(robots: Robots, run: Run) -> None:
         """False where a busy machine met it too late."""
         code, out, err = run("stop", "--timeout", "0.3")
         assert (code, out) == (1, "")
-        return err == "Fred did not confirm within 0.3 s (never); it may move\n"
+        return err == "holozen stop: Fred did not confirm within 0.3 s (never); it may move\n"
 
     wait_for(is_reported)
 
@@ -251,7 +251,7 @@ def test_a_reply_that_is_none_confirms_nothing(wire: Wire, run: Run, payload: by
         """False where a busy machine met it too late."""
         code, out, err = run("stop", "--timeout", "0.3")
         assert (code, out, err.count("\n")) == (1, "", 1)
-        return err.startswith("Fred did not confirm within 0.3 s")
+        return err.startswith("holozen stop: Fred did not confirm within 0.3 s")
 
     wait_for(is_reported)
     token.undeclare()

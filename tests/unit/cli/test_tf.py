@@ -77,3 +77,15 @@ def test_echo_prints_what_tf2_echo_prints(wire: Wire, run: Run) -> None:
     assert (code, out, err) == (1, "", "holozen tf echo: no transforms on tf; there are some with --robot Fred\n")
     row = json.loads(run(*words, "--json")[1])
     assert (row["source"], row["target"], row["rpy"][2]) == ("odom", "lidar", pytest.approx(QUARTER))
+
+
+def test_a_robot_without_transforms_is_reported_with_those_that_have_some(wire: Wire, run: Run) -> None:
+    """Also with the one at the root, which many a student asks for by its name."""
+    bus = wire.bus("sim", lasting=True)
+    bus.publisher("tf", TFMessage)
+    words = ("tf", "echo", "odom", "base_link", "--timeout", "0.2", "--robot")
+    assert run(*words, "hb_bot")[2] == "holozen tf echo: no transforms on hb_bot/tf; there are some without --robot\n"
+    bus.publisher("Fred/tf", TFMessage)
+    both = "there are some without --robot and with --robot Fred"
+    assert run(*words, "hb_bot")[2] == f"holozen tf echo: no transforms on hb_bot/tf; {both}\n"
+    assert run(*words, "Fred")[2] == "holozen tf echo: no transforms on Fred/tf; there are some without --robot\n"

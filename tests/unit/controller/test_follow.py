@@ -158,6 +158,21 @@ def test_it_waits_for_the_service_and_reports_it_once(case: Case) -> None:
     assert sum("goal" in report for report in case.reports) == 1  # others are of a busy machine's stale odom
 
 
+def test_without_the_service_too_a_robot_that_is_not_there_is_reported(
+    wire: Wire, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("services.controller.follow.NOTICE", 0.0)
+    _odom = wire.bus("sim").publisher("Ann/odom", Odometry)
+    stop, reports = threading.Event(), list[str]()
+    follower = Follower(wire.bus("controller"), "Fred", QUICK, stop, reports.append)
+    with ThreadPoolExecutor() as pool:
+        pool.submit(follower.lap)
+        wait_for(lambda: reports)
+        stop.set()
+    assert reports[0].startswith("waiting for goal 0: no reply from 'next_goal' within 0.5 s")
+    assert reports[0].endswith("; Fred: no node publishes its odom; there are: Ann")
+
+
 def test_a_first_goal_that_is_refused_is_asked_for_again(case: Case) -> None:
     reasons = iter(["the list is being read"])
     case.goals(fail=lambda _: next(reasons, ""))

@@ -12,8 +12,8 @@ from holozen.testing import Wire, wait_for
 from holozen.transport.errors import ServiceError
 from holozen.transport.pubsub import Publisher
 from holozen.wire import TOPICS
-from services.pose_service import tracker
-from services.pose_service.tracker import MAX_NAMES, Tracker
+from services.pose_service import __main__ as pose_service
+from services.pose_service.__main__ import MAX_NAMES, Tracker
 
 SILENCE = next(row.silence for row in TOPICS if row.key == "odom")
 
@@ -104,7 +104,7 @@ def test_what_is_no_odom_of_a_robot_is_left_out(robots: Robots) -> None:
 def test_of_too_many_robots_the_one_that_has_been_silent_for_longest_is_forgotten(
     robots: Robots, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tracker, "MAX_ROBOTS", 60)
+    monkeypatch.setattr(pose_service, "MAX_ROBOTS", 60)
     odom = encode(Odometry())
 
     def reply(name: str) -> GetPoseReply | None:

@@ -5,6 +5,8 @@ import errno
 import os
 import signal
 import socket
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -127,6 +129,22 @@ def test_where_the_lasting_process_was_killed_there_is_a_new_one() -> None:
     os.kill(parent, signal.SIGKILL)
     os.waitpid(parent, 0)
     assert reader.run(int, "it", abs, -1) == 1
+
+
+def test_an_interrupt_that_reaches_it_as_it_starts_is_for_the_parent_alone() -> None:
+    """Ctrl-C, or the end of `holozen launch`, signals all processes of a group. Python runs code of its own in each
+    forked process, in which an interrupt cannot be caught.
+    """
+    code = """if True:
+        import os, signal
+        from holozen.robot import reader
+        parent = os.getpid()
+        interrupt = lambda: os.getppid() == parent and os.kill(os.getpid(), signal.SIGINT)
+        os.register_at_fork(after_in_child=lambda: interrupt())
+        print(reader.run(int, "it", abs, -1), signal.pthread_sigmask(signal.SIG_BLOCK, ()))
+    """
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("1 set()\n", "")
 
 
 def mesh(name: str) -> str:

@@ -4,6 +4,8 @@ from typing import Any
 
 import pytest
 
+from holozen.command.feedback import HELD, ONLY_TURNS
+from holozen.messages import CommandSource, CommandStatus
 from holozen.ros import rclpy
 from holozen.ros.generated import find
 from holozen.ros.rclpy import context, qos
@@ -74,3 +76,38 @@ def test_after_a_signal_there_is_time_for_a_stop_and_no_more(ros: Wire, monkeypa
     monkeypatch.setattr(context, "GRACE", 0.0)
     with pytest.raises(ExternalShutdownException):
         publisher.publish(Twist())
+
+
+def test_a_robot_that_does_not_obey_is_logged_with_the_reason_once(
+    ros: Wire, capfd: pytest.CaptureFixture[str]
+) -> None:
+    sim = ros.bus("sim")
+    statuses = sim.publisher("cmd_vel_status", CommandStatus)
+    node = rclpy.create_node("tom")
+    publisher = node.create_publisher(Twist, "cmd_vel", 1)
+    me = node._holozen.bus.source
+    sideways = Twist()
+    sideways.linear.y = 0.1
+    logged = list[str]()
+
+    def reports(status: CommandStatus, command: Any) -> str:
+        """What is logged once that status has come, while the script publishes on."""
+        before = len(logged)
+
+        def is_logged() -> bool:
+            statuses.put(status)
+            publisher.publish(command)
+            logged.extend(capfd.readouterr().err.splitlines())
+            return len(logged) > before
+
+        wait_for(is_logged)
+        return logged[-1].partition("[tom]: ")[2]
+
+    assert reports(CommandStatus("ann@1", sources=[CommandSource(me)]), Twist()) == "/cmd_vel: not obeyed: ann@1 drives"
+    assert reports(CommandStatus(me), Twist()) == "/cmd_vel: obeyed again"
+    held = reports(CommandStatus(sources=[CommandSource(me, held=True)]), Twist())
+    assert held == f"/cmd_vel: not obeyed: {HELD}; `holozen controller --resume` lets it drive again"
+    assert reports(CommandStatus(me, strafes=False), Twist()) == "/cmd_vel: obeyed again"
+    assert reports(CommandStatus(me, strafes=False), sideways) == f"/cmd_vel: {ONLY_TURNS}"
+    assert len(logged) == 5
+    assert not [end for end in sim.endpoints() if end.kind == "sub" and end.key == "cmd_vel_status"]

@@ -14,7 +14,7 @@ from holozen.transport.samples import PRIORITIES
 
 FORWARD: Planar = (0.3, 0.0, 0.0)
 LEFT: Planar = (0.0, 0.3, 0.0)
-HELD = "held: a higher source took over; `holozen controller --resume` lets it drive again"
+HELD = "held: another source took over; `holozen controller --resume` lets it drive again"
 PERSON, SCRIPT, CONTROLLER, BACKGROUND = (
     PRIORITIES.index(name) for name in ("INTERACTIVE_HIGH", "DATA", "DATA_LOW", "BACKGROUND")
 )

@@ -21,6 +21,7 @@ from holozen.messages import (
     Header,
     JointState,
     Message,
+    Odometry,
     Point,
     Pose,
     PoseStamped,
@@ -153,6 +154,22 @@ def test_a_key_that_is_taken_is_reported_with_what_frees_it(town: Town) -> None:
     ):
         found = town.refusal(partial(town.spawn, "Bob", x=-5.0, entity_namespace=namespace))
         assert found == (si.SpawnEntityReply.NAME_NOT_UNIQUE, f"{key}; {advice}")
+
+
+def test_what_would_be_replaced_is_called_taken_only_if_its_successor_may_have_its_keys(town: Town) -> None:
+    """A caller deletes what has the name, and could then not spawn the new one."""
+    town.spawn("Fred")
+    town.spawn("Ann", x=5.0, entity_namespace="lab")
+    found = town.refusal(partial(town.spawn, "Fred", entity_namespace="lab"))
+    expected = "lab/cmd_vel is the key of 'Ann'; delete that one, or use another namespace"
+    assert found == (si.SpawnEntityReply.NAMESPACE_INVALID, expected)
+    _odom = town.client.publisher("dock/odom", Odometry)
+    wait_for(lambda: town.entities.others_on("dock/odom", "pub"))
+    code, why = town.refusal(partial(town.spawn, "Fred", entity_namespace="dock"))
+    assert (code, "dock/odom is published by client" in why) == (si.SpawnEntityReply.NAMESPACE_INVALID, True)
+    for namespace in ("", "/", "other"):
+        found = town.refusal(partial(town.spawn, "Fred", entity_namespace=namespace))
+        assert found[0] == si.SpawnEntityReply.NAME_NOT_UNIQUE, found
 
 
 def test_a_robot_without_a_drive_is_an_object_without_keys(town: Town) -> None:

@@ -362,7 +362,7 @@ def test_the_first_and_the_300th_robot_stand_when_their_drivers_fall_silent_and_
     assert not any(speeds())
     me = wire.bus("me")
     for robot, name in ((first, "Fred"), (last, "bot299")):
-        robot.set_timeout(-1.0, clock[0])
+        robot.arbiter.set_timeout(-1.0, clock[0])
         robot.arbiter.offer("me", 4, FORWARD, clock[0])
         assert sum(map(bool, speeds())) == 1
         with ThreadPoolExecutor() as pool:
@@ -378,7 +378,7 @@ def test_a_changed_timeout_applies_to_the_current_driver(clock: list[float], sim
     sim.run(240)
     sim.arbiter.offer("me", 4, FORWARD, clock[0])
     sim.run(1)
-    sim.robot.set_timeout(0.1, clock[0])
+    sim.robot.arbiter.set_timeout(0.1, clock[0])
     clock[0] += 0.11
     sim.run(1)
     assert sim.robot.mover.body.twist()[0] == (0, 0, 0)

@@ -9,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holozen.messages import Header, Quaternion, Time, Twist
+from holozen.odometry import odometry, transform
 from holozen.robot.loading import load
 from holozen.robot.model import Drive, Joint, Limits, Link, Pose, RobotModel
 from holozen.robot.rotation import Array, matrix_of, quaternion_of
-from services.sim.io.topics import JointFrames, covariance, odometry, transform
+from services.sim.io.topics import JointFrames, covariance
 from services.sim.schedule import Schedule
 
 REPO = Path(__file__).parents[3]

@@ -35,7 +35,7 @@ def states() -> st.SearchStrategy[State]:
         command=st.none() | _planar, measured=_planar, odom_age=_floats, stale=st.booleans(),
         round_trip=st.none() | _floats, real_time_factor=st.none() | _floats,
         listeners=st.lists(_words, max_size=3), sources=st.lists(sources, max_size=5),
-        obeyed=_words, held=st.booleans(), source=_words, stopped=_words,
+        obeyed=_words, held=st.booleans(), source=_words, stopped=_words, paused=st.booleans(),
         pose=st.none() | _planar, trail=st.lists(st.tuples(_floats, _floats), max_size=9), warning=_words, key=_words,
         keys=st.lists(_words, max_size=14), help=st.booleans(), ascii=st.booleans(),
     )  # fmt: skip

@@ -22,6 +22,7 @@ from holozen.messages import (
     Twist,
     TwistStamped,
 )
+from holozen.messages.simulation_interfaces import SimulationState
 from holozen.odometry import LOST, RESTS
 from holozen.testing import Wire, wait_for
 from holozen.transport.errors import BusError, ServiceError
@@ -30,8 +31,7 @@ from services.teleop.control.key_state import LATCH
 from services.teleop.control.layouts import TTK
 from services.teleop.control.twist_mapper import Settings, TwistMapper
 from services.teleop.input.kitty import Answer, Focus, Key, Unknown
-from services.teleop.robot_client import RobotClient
-from services.teleop.session import BLIND, RESET, RESUME_TIMEOUT, SWITCHING, Session
+from services.teleop.session import BLIND, RESET, RESUME_TIMEOUT, SWITCHING, RobotClient, Session
 from services.teleop.telemetry import Telemetry, Track
 from services.teleop.view import State
 
@@ -254,6 +254,23 @@ def test_the_state_shows_the_robot_and_its_driver(
     wait_for(lambda: state().stale)  # the robot publishes no more
     press(session, "l")
     assert state().command == (0, 0, -1)
+
+
+def test_a_paused_sim_is_shown_until_it_goes_on_or_says_no_more(
+    wire: Wire, robot: Robot, telemetry_of: Callable[[Session], Callable[[], State]]
+) -> None:
+    sim = robot.bus.publisher("simulation_status", SimulationStatus)
+    state = telemetry_of(session_of(wire, robot))
+    assert not state().paused
+
+    def publish(number: int) -> bool:
+        sim.put(SimulationStatus(number))
+        return state().paused
+
+    wait_for(lambda: publish(SimulationState.STATE_PAUSED))
+    wait_for(lambda: not publish(SimulationState.STATE_PLAYING))
+    wait_for(lambda: publish(SimulationState.STATE_PAUSED))
+    wait_for(lambda: not state().paused)  # the sim publishes no more
 
 
 def test_the_way_to_the_sim_and_back_is_measured(

@@ -86,6 +86,7 @@ def test_every_alarm_is_shown_whole_where_there_is_room() -> None:
     assert loud(replace(GOOD, robot="", stopped="me"), (80, 24)) == [
         "STOPPED by me: `holozen release` lets it drive again"
     ]
+    assert loud(replace(GOOD, paused=True), (80, 24)) == ["PAUSED: `holozen sim play` continues the sim"]
     assert loud(replace(GOOD, stale=True, odom_age=math.inf), (80, 24)) == ["NO ODOM: nothing was heard from a robot"]
     assert loud(replace(GOOD, deadman=True, deadman_held=True), (80, 24)) == []
 
@@ -361,6 +362,7 @@ def test_no_alarm_is_ever_lost(state: State, size: tuple[int, int]) -> None:
     alarms = [part for line in render(state, *size) for style, part in line if style == "alarm"]
     expected = "\n".join(alarms)
     assert ("STOPPED" in expected) == bool(state.stopped)
+    assert ("PAUSED" in expected) == state.paused
     assert ("NO SUBSCRIBER" in expected) == (not state.listeners)
     assert ("NO ODOM" in expected) == (not math.isfinite(state.odom_age))
     assert ("ODOM IS STALE" in expected) == (math.isfinite(state.odom_age) and state.stale)

@@ -67,7 +67,7 @@ class _ResultClient(Client):
         bus, kind = self._handle.bus, self.srv_type.Response
         payload, wire = codec.written(request, bus.wire)
         encoding = codec.encoding(wire, type(request))
-        reply = wait_for_result(bus, self._action, payload, encoding, self._closed.is_set)
+        reply = wait_for_result(bus, self._action, payload, encoding, lambda: self._is_closed)
         return codec.decode(reply.payload, reply.encoding, (kind,), tolerant=True) if reply else None
 
 

@@ -1,0 +1,129 @@
+"""Whether a robot follows the commands of a source, and why not, by its `cmd_vel_status`."""
+
+import math
+import threading
+import time
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+from holozen import wire
+from holozen.bus import Latest
+from holozen.console import report as report_line
+
+FRESH = 1.0  # s; an older status is ignored
+COVERED = 3  # statuses after a command, of which the last was sent after the command has been read
+HOLDING = 0.3  # s within which a status tells who is held after a stop; it comes at 10 Hz
+VELOCITIES = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
+LIMITED = "over the limits"  # prefix of the sim's reason when it drives slower than commanded
+OVERRULED = "overruled"  # prefix of its reason when a higher source drives
+DRIVES = " drives"
+ONLY_TURNS = "linear.y is ignored: this robot's drive only goes forward, backward and turns"
+HELD = "held, since another source took over"
+RESUME = "; `{command}` lets it drive again"
+HOLDS = "{driver} is held now, as by any stop of an equal; `{command}` lets it drive again"
+
+
+def verdict(status: Any, source: str) -> str | None:
+    """Why the robot does not follow the commands of `source`, by a CommandStatus; empty if it does. None if the sim has
+    not received any yet: a status sent before the command arrived does not cover it.
+    """
+    mine = next((each for each in status.sources if each.source == source), None)
+    own_refusal = status.last_refusal.removeprefix(f"{source}: ")
+    if own_refusal == status.last_refusal:
+        own_refusal = ""
+    if status.stopped:
+        return f"{status.stopped} has set the software stop"
+    if status.obeyed == source or (mine and mine.obeyed):
+        return own_refusal if own_refusal.startswith(LIMITED) else ""
+    if (mine and mine.held) or own_refusal.startswith("held: "):
+        return HELD
+    if mine and status.obeyed and own_refusal.partition(":")[0] in ("", OVERRULED):
+        return f"{status.obeyed}{DRIVES}"
+    return own_refusal or None
+
+
+def verdict_on_part(status: Any, before: Any, source: str) -> str | None:
+    """As `verdict`, of commands to joints or forces, whose sources a status names only where they drive or are refused.
+    `before` is the status before it: a command that is accepted after a refusal is known by the counts.
+    """
+    why = verdict(status, source)
+    if not why or status.stopped or status.refused != before.refused:
+        return why
+    return "" if status.accepted > before.accepted and not status.obeyed and not status.sources else None
+
+
+class CommandFeedback:
+    """Reports when a robot starts or stops obeying a `source`, by the `latest` status on `key`.
+
+    If the commands are no velocities (`is_velocity`) but move joints or are forces, they are judged by
+    `verdict_on_part`. `more` says more of why the robot does not obey, given the source that drives instead, if any.
+    """
+
+    def __init__(
+        self,
+        source: str,
+        key: str,
+        latest: Latest[Any],
+        is_velocity: bool = True,
+        report: Callable[[str], None] = report_line,
+        more: Callable[[str], str] = lambda _driver: "",
+    ) -> None:
+        self._source, self._latest, self._is_velocity, self._report, self._more = (
+            source, latest, is_velocity, report, more,
+        )  # fmt: skip
+        self._resume = wire.resume_command(key.rpartition("/")[0])
+        self._reported = self._driver = ""
+        self._judged: Any = None  # the last status, and the one before
+        self._before: Any = None
+        self._has_noted = False
+        self.strafes = False
+        """Whether the commands have a sideways part, which not every drive can make."""
+        self.refusal = ""
+        """Why the robot does not obey, by the latest look; empty if it does, or is not known to."""
+
+    def look(self) -> bool:
+        """Report any change; returns whether the sim has judged the commands yet."""
+        status, age = self._latest.read()
+        if not status or age >= FRESH or (why := self._verdict(status)) is None:
+            return False
+        self._driver = status.obeyed if why.endswith(DRIVES) else ""
+        if why != self._reported:
+            if why and not why.startswith(LIMITED):
+                resume = RESUME.format(command=self._resume) if why == HELD else ""
+                self._report(f"not obeyed: {why}{resume}{self._more(self._driver)}")
+            else:
+                self._report(why or "obeyed again")
+        if self.strafes and status.obeyed == self._source and not (status.strafes or self._has_noted):
+            self._report(ONLY_TURNS)
+            self._has_noted = True
+        self._reported, self.refusal = why, "" if why.startswith(LIMITED) else why
+        return True
+
+    def wait(self, stop: threading.Event, seconds: float) -> None:
+        """Wait until the sim has judged the commands; report if it has not after so many `seconds`."""
+        deadline, received = time.monotonic() + seconds, self._latest.count
+        while not self.look() and not stop.wait(0.002):
+            if not self._is_velocity and self._latest.count >= received + COVERED:
+                return  # it says nothing of what it accepts
+            if time.monotonic() > deadline:
+                if self._latest.read()[1] < FRESH and self._is_velocity:
+                    self.refusal = "the sim has not received it; does anything flood it?"
+                    self._report(f"not obeyed: {self.refusal}")
+                return
+
+    def report_held(self) -> None:
+        """After a stop was sent while another source drove: report that it holds that one, if it does."""
+        deadline = time.monotonic() + HOLDING
+        while self._driver and (left := deadline - time.monotonic()) > 0:
+            status, _ = self._latest.read()
+            if status and any(each.source == self._driver and each.held for each in status.sources):
+                return self._report(HOLDS.format(driver=self._driver, command=self._resume))
+            self._latest.wait(self._latest.count, left)
+
+    def _verdict(self, status: Any) -> str | None:
+        if self._is_velocity:
+            return verdict(status, self._source)
+        if status is not self._judged:
+            self._before, self._judged = self._judged or SimpleNamespace(refused=None, accepted=math.inf), status
+        return verdict_on_part(status, self._before, self._source)
