@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 from holozen.check.engine import Mistake, Subject, rule
 from holozen.check.spelling import nearest
+from holozen.robot.elements import Tag
 from holozen.robot.gazebo_plugins import DRIVES, KNOWN, MOVING_ELSEWHERE, file_name, file_of, kind_of
 from holozen.suggest import listed, suggest
 
@@ -51,7 +52,20 @@ def _plugin_links(subject: Subject) -> Iterator[Mistake]:
             problem = f"<{tag.name}> is {name!r}, which names no link{suggest(name, subject.links)}"
             yield Mistake(tag, problem, f"links: {listed(subject.links)}")
         elif plain in FRAME_TAGS and (suggestion := nearest(name, subject.links)):
-            yield Mistake(tag, f"<{tag.name}> is {name!r}, which names no link", f"write {suggestion}")
+            own = _link_of(tag) if plain != "childframeid" else ""
+            fix = f"write {own}, which has the sensor; links: {listed(subject.links)}" if own else f"write {suggestion}"
+            yield Mistake(tag, f"<{tag.name}> is {name!r}, which names no link", fix)
+
+
+def _link_of(tag: Tag) -> str:
+    """The link of the `<sensor>` that contains an element; empty without one."""
+    sensor = tag
+    while sensor.name != "sensor":
+        if sensor.parent is None:
+            return ""
+        sensor = sensor.parent
+    owner = sensor.parent
+    return (owner.attributes.get("reference") or owner.attributes.get("name", "")) if owner else ""
 
 
 @rule("plugin-joint", "error", "a plugin's joint that does not exist", "the plugin has nothing to turn")

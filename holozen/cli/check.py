@@ -19,6 +19,8 @@ from holozen.suggest import suggest, suggest_file
 if TYPE_CHECKING:
     from holozen.check.engine import Finding
 
+LARGEST = 20.0  # m; a larger size was given in other units
+
 NOTES = """Without an error the last line summarizes the file. The exit code is 1 if there is an error, 0 if
 there are no findings or only warnings, 2 for wrong usage. The lines of the --require file are `link NAME` or
 `joint NAME [TYPE]`; # starts a comment."""
@@ -129,8 +131,9 @@ def _size(text: str) -> tuple[float, ...]:
         values = tuple(float(word) for word in words)
     except ValueError:
         values = ()
-    if len(values) not in (2, 3) or not all(0 < value < 1e3 for value in values):
-        raise argparse.ArgumentTypeError(f"{text!r}: write metres as 0.4x0.2 or 0.4x0.2x0.3 (length, width, height)")
+    if len(values) not in (2, 3) or not all(0 < value <= LARGEST for value in values):
+        size = f"(length, width, height), each at most {LARGEST:g}"
+        raise argparse.ArgumentTypeError(f"{text!r}: write metres as 0.4x0.2 or 0.4x0.2x0.3 {size}")
     return values
 
 

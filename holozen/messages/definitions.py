@@ -333,7 +333,8 @@ def completed(interface: Interface, value: Any, path: str = "", tolerant: bool =
     for name in value:
         if name not in names and not tolerant:
             where = f"{path}.{name}" if path else f"{name}"
-            raise InterfaceError(f"{interface.name} has no field {where[:80]!r}{field_hint(str(name), names)}")
+            hint = _slip(name, value[name]) or field_hint(str(name), names)
+            raise InterfaceError(f"{interface.name} has no field {where[:80]!r}{hint}")
     return {
         field.name: _checked(field, value[field.name], f"{path}.{field.name}".lstrip("."), tolerant)
         if field.name in value
@@ -350,6 +351,13 @@ def with_mappings(interface: Interface, value: dict[str, Any]) -> dict[str, Any]
     """A message with all its fields as JSON and msgpack have it, see MAPPED."""
     mapped = [field for field in interface.fields if field.nested and field.nested.name == MAPPED]
     return value | {field.name: dict(pair.values() for pair in value[field.name]) for field in mapped}
+
+
+def _slip(name: object, value: object) -> str:
+    """The end of an error line about a name that only YAML's rules made of what was written; else empty."""
+    if ":" in str(name):
+        return "; write a space after ':'"
+    return "; write a decimal point, not a comma" if value is None and str(name).isdecimal() else ""
 
 
 def field_hint(name: str, names: Sequence[str]) -> str:

@@ -25,6 +25,8 @@ _NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/(?:(msg|srv|action)/)?([A-Za-z][A-Z
 DEEPEST = 50  # levels of nesting
 MAX_LOST = 100  # unknown names that are remembered, so that they are not looked up again
 MAX_SHOWN = 20  # names in an error
+OTHER_WORDS = {"float": "float32 or float64", "double": "float64", "int": "int32 or int64", "boolean": "bool"}
+"""Types of other languages -> the ones to write."""
 _HALVES = ("_Request", "_Response")
 _PARTS = tuple(f"_{part}{half}" for part in ACTION_PARTS for half in ("", *_HALVES))  # ends of names within an action
 
@@ -103,13 +105,16 @@ class Places:
         return found
 
     def packages(self) -> list[str]:
-        """Our own, the given ones, and those of the environment's folders that hold definitions."""
+        """Our own, the given ones, and those of the environment's folders and around that hold definitions."""
         shared = [os.path.join(prefix, "share") for prefix in _environment("AMENT_PREFIX_PATH")]
         for place in (*shared, *_environment("ROS_PACKAGE_PATH")):
             for name in _listing(place):
                 path = os.path.join(place, name)
                 if re.fullmatch(r"\w+", name) and any(_names_in(path)):
                     self._found.setdefault(name, path)
+        for name, path in _around(self._near).items():
+            if any(_names_in(path)):
+                self._found.setdefault(name, path)
         return sorted({*tables(), *self._given, *(name for name, path in self._found.items() if path)})
 
     def folder(self, package: str) -> str | None:
@@ -128,16 +133,28 @@ def _look_up(package: str, near: Paths) -> str | None:
     """The folder of a package that is not ours, found as those of robot files are. Raises InterfaceError."""
     from pathlib import Path
 
-    from holozen.robot.packages import find_named, folders_above, folders_below, packages_in
+    from holozen.robot.packages import find_named
+
+    try:
+        found = next(filter(None, (find_named(package, start) for start in [*map(Path, near), Path.cwd()])), None)
+    except OSError as error:  # the working folder is gone
+        raise InterfaceError(f"package {package}: {error.strerror}") from None
+    return str(found) if found else _around(near).get(package)
+
+
+def _around(near: Paths) -> dict[str, str]:
+    """Name -> folder of the packages above and below the files or folders `near`, and the working folder."""
+    from pathlib import Path
+
+    from holozen.robot.packages import folders_above, folders_below, packages_in
 
     try:
         starts = [*map(Path, near), Path.cwd()]
-        found = next(filter(None, (find_named(package, start) for start in starts)), None)
-        below = (each for start in starts if folders_above(start) for each in folders_below(start))
-        found = found or packages_in(list(below)).get(package)
-    except OSError as error:  # the working folder is gone
-        raise InterfaceError(f"package {package}: {error.strerror}") from None
-    return str(found) if found else None
+    except OSError:  # the working folder is gone
+        return {}
+    ways = [(above, folders_below(start)) for start in starts if (above := folders_above(start))]
+    found = packages_in([folder for way in zip(*ways, strict=True) for folders in way for folder in folders])
+    return {name: str(folder) for name, folder in found.items()}
 
 
 def _environment(variable: str) -> list[str]:
@@ -295,6 +312,8 @@ class Registry:
             there = self.places.packages()
             hint = suggest(package, there) or f"; known: {listed(there, MAX_SHOWN)}"
             return f"no package {package!r} with interfaces{hint}; give its folder: --package {package}=DIR"
+        if near := OTHER_WORDS.get(last_part(name)):
+            return f"no type {name!r}; write {near}"
         return f"no type {name!r}{suggest(name, known, last_part) or '; known: ' + listed(known, MAX_SHOWN)}"
 
 

@@ -64,6 +64,8 @@ def file_of(plugin: Tag) -> str:
 
 SMALLEST = 1e-3  # m; smallest wheel radius, and distance between wheels
 
+PUBLISHED_TOO = ("tf", "joint_states")  # by drives in Gazebo; here they have these names
+
 _KEY = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(/[A-Za-z0-9_][A-Za-z0-9_-]*)*")
 
 
@@ -73,6 +75,7 @@ class Settings:
     def __init__(self, owner: Tag) -> None:
         self.owner = owner
         self._tags = {_snake_case(tag.name): tag for tag in reversed(owner.children)}
+        self._topics: set[str] = set()  # those that were asked for, by the names that a remapping may give
 
     def tag(self, *names: str) -> Tag:
         """The first of `names` that is present and not empty, else an empty tag."""
@@ -132,6 +135,7 @@ class Settings:
         """
         remapped = dict(self._remappings())
         topic = self.word(*names) or default
+        self._topics |= {default, topic.strip("/")}
         topic = remapped.get(topic.strip("/"), remapped.get(default, topic))
         key = topic if topic.startswith("/") else f"{self._namespace()}/{topic}"
         key = re.sub("/+", "/", key).strip("/")
@@ -151,6 +155,16 @@ class Settings:
         """Whether ROS 2's `<remapping>` gives it another name."""
         return topic in dict(self._remappings())
 
+    def check_remappings(self, source: Source, complete: bool = False) -> None:
+        """Warn of each `<remapping>` that is not OLD:=NEW; and if all topics were read (`complete`), of one of none."""
+        known = sorted(self._topics)
+        for tag, old, new in self._remapping_tags():
+            if not (old and new):
+                source.warn(tag, f"is {cut(tag.value())}, which renames nothing; write OLD:=NEW, as cmd_vel:=my_vel")
+            elif complete and old not in (*known, *PUBLISHED_TOO):
+                near = source.suggest(old, known)
+                source.warn(tag, f"renames {cut(old)}, which is no topic of this plugin{near}; topics: {listed(known)}")
+
     def _found(self, names: tuple[str, ...]) -> Tag | None:
         return next((self._tags[name] for name in names if name in self._tags and self._tags[name].value()), None)
 
@@ -160,11 +174,13 @@ class Settings:
         return namespace.value() if namespace else self.word("robot_namespace")
 
     def _remappings(self) -> Iterator[tuple[str, str]]:
+        return ((old, new) for _, old, new in self._remapping_tags() if new)
+
+    def _remapping_tags(self) -> Iterator[tuple[Tag, str, str]]:
         ros = self._tags.get("ros")
         for tag in (*(ros.all("remapping") if ros else ()), *self.owner.all("remapping")):
             old, _, new = tag.value().partition(":=")
-            if new.strip():
-                yield old.strip().removeprefix("~").strip("/"), new.strip()
+            yield tag, old.strip().removeprefix("~").strip("/"), new.strip()
 
 
 def _snake_case(name: str) -> str:
@@ -383,7 +399,9 @@ def _ros_drive(
     named = zip(("covariance_x", "covariance_y", "covariance_yaw"), variances, strict=True)
     x, y, yaw = (settings.number(variance, name) for name, variance in named)
     rate, tags = Drive().odometry_rate, ["odometry_rate", "publish_rate"]
-    if not isinstance(mechanism, Planar | Omni):
+    if isinstance(mechanism, Planar | Omni):
+        settings.number(0.0, "update_rate")  # of commands, which are obeyed at each step
+    else:
         rate, tags = WHEELED_RATE, ["update_rate", *tags]
     return Drive(
         command_topic=settings.topic("cmd_vel", "command_topic"),
@@ -625,7 +643,9 @@ def _force(plugin: Tag, links: Mapping[str, Link], source: Source) -> Force | No
     frame = settings.word("force_frame") or "world"
     if frame not in FRAMES:
         raise settings.tag("force_frame").wrong(f"is {cut(frame)}; it must be world or link")
-    return Force(tag.value(), settings.topic(FORCE, "topic_name"), FRAMES[frame])
+    topic = settings.topic(FORCE, "topic_name")
+    settings.check_remappings(source, complete=True)
+    return Force(tag.value(), topic, FRAMES[frame])
 
 
 # The plugins of a robot.
@@ -695,7 +715,9 @@ def read_plugins(
         elif drive is not None:
             source.warn(plugin, "is a second drive; only the first one drives")
         else:
-            found = DRIVES[kind](Settings(plugin), joints, source)
+            settings = Settings(plugin)
+            found = DRIVES[kind](settings, joints, source)
+            settings.check_remappings(source, complete=True)
             drive, driver = measured(found, plugin, RobotModel("", root, links, joints, None)), plugin
     if wheels:
         if drive and not isinstance(drive.mechanism, Planar):

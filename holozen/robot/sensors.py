@@ -131,6 +131,7 @@ class _Reading:
             if other is not plugin:
                 self._source.warn(other, f"is not supported in a <sensor>; {tag} publishes its ROS message anyway")
         sensor = _SensorTag(tag, plugin, kind)
+        sensor.plugin.check_remappings(self._source)
         for unkept in ("distortion", "lens"):
             for child in (part for owner in tag.all("camera") for part in owner.all(unkept)):
                 if any(number(value.value()) for value in child.children):

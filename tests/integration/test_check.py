@@ -84,6 +84,7 @@ def test_a_task_sets_size_and_names(tmp_path: Path) -> None:
         (["--fits", "big"], "write metres as 0.4x0.2"),
         (["n=1"], "write n:=1"),
         (["--fits", "1x-1"], "write metres"),
+        (["--fits", "400x200"], "(length, width, height), each at most 20"),
     ],
 )
 def test_wrong_words_are_reported(words: list[str], expected: str) -> None:

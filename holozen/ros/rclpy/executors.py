@@ -17,6 +17,7 @@ from holozen.ros.rclpy.exceptions import RCLError
 from holozen.ros.rclpy.task import Future, Task, TaskQueue
 from holozen.ros.rclpy.timer import Timer
 from holozen.ros.rclpy.waitable import Waitable, Waker, Work, deadline
+from holozen.suggest import shorten
 
 __all__ = [
     "ConditionReachedException", "Executor", "MultiThreadedExecutor", "ShutdownException", "SingleThreadedExecutor",
@@ -74,7 +75,12 @@ class Executor(HelpfulAttributes):
         return self._tasks.create_task(callback, *args, **kwargs)
 
     def add_node(self, node: Any) -> bool:
-        """Run the callbacks of a node, which leaves any other executor. False if it was added before."""
+        """Run the callbacks of a node, which leaves any other executor. False if it was added before. Raises TypeError
+        for what is no node.
+        """
+        if isinstance(node, type) or not hasattr(node, "executor"):
+            name, given = (node.__name__, "the class") if isinstance(node, type) else ("MyNode", shorten(repr(node)))
+            raise TypeError(f"pass a node, such as {name}(), not {given}")
         if node in self._nodes:
             return False
         self._nodes.append(node)

@@ -40,7 +40,7 @@ from holozen.ros.rclpy.qos import QoSProfile, as_profile, qos_profile_default, q
 from holozen.ros.rclpy.service import Service
 from holozen.ros.rclpy.subscription import Subscription
 from holozen.ros.rclpy.timer import Rate, Timer
-from holozen.ros.rclpy.waitable import GuardCondition, Waitable
+from holozen.ros.rclpy.waitable import GuardCondition, Waitable, check_callback
 from holozen.suggest import article
 from holozen.transport import session
 from holozen.transport.graph import Endpoint
@@ -355,6 +355,7 @@ class Node(HelpfulAttributes):
         autostart: bool = True,
     ) -> Timer:
         """Call `callback()` every `timer_period_sec` seconds of a clock, by default the node's, while it is spun."""
+        check_callback(callback)
         state, period = self._holozen, int(float(timer_period_sec) * 1e9)
         group, clock = callback_group or state.group, clock or state.clock
         return state.own(Timer(callback, group, period, clock, context=state.context, autostart=autostart))

@@ -10,7 +10,7 @@ from holozen.ros.rclpy.callback_groups import CallbackGroup
 from holozen.ros.rclpy.handle import NodeHandle, Owned
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import QoSProfile
-from holozen.ros.rclpy.waitable import Inbox, Waitable, Waker
+from holozen.ros.rclpy.waitable import Inbox, Waitable, Waker, check_callback
 from holozen.suggest import article
 from holozen.transport.errors import ServiceError
 from holozen.transport.services import refuse
@@ -39,6 +39,7 @@ class Service(Owned, Waitable):
         callback_group: CallbackGroup | None,
         qos_profile: QoSProfile,
     ) -> None:
+        check_callback(callback)
         self.srv_type, self.srv_name, self.qos_profile = srv_type, srv_name, qos_profile
         self.callback, self.callback_group = callback, callback_group
         self._handle, self._closed = handle, False

@@ -15,8 +15,7 @@ from holozen.ros.rclpy.callback_groups import CallbackGroup
 from holozen.ros.rclpy.handle import NodeHandle, Owned
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import DurabilityPolicy, QoSProfile, as_profile, queue_length
-from holozen.ros.rclpy.waitable import Inbox, Waitable, Waker, deadline
-from holozen.suggest import article
+from holozen.ros.rclpy.waitable import Inbox, Waitable, Waker, check_callback, deadline
 from holozen.transport.errors import BusError
 from holozen.transport.samples import Sample
 
@@ -213,13 +212,11 @@ def wait_for_message(
 
 def _argument_count(callback: Callable[..., Any]) -> int:
     """Whether a callback takes a message (1) or a message and its info (2). Raises RuntimeError for any other."""
+    check_callback(callback)
     try:
         signature = inspect.signature(callback)
-    except (TypeError, ValueError):  # a built-in function, or not a function
-        if callable(callback):
-            return 1
-        given = article(type(callback).__name__)
-        raise TypeError(f"a callback must be a function, and {callback!r} is {given}") from None
+    except (TypeError, ValueError):  # a built-in function
+        return 1
     for count in (1, 2):
         try:
             signature.bind(*[None] * count)

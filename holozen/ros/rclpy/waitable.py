@@ -16,6 +16,7 @@ from queue import SimpleQueue
 from typing import Any, Generic, TypeVar
 
 from holozen.ros.rclpy.callback_groups import CallbackGroup
+from holozen.suggest import article
 from holozen.transport.errors import BusError
 
 __all__ = ["GuardCondition"]
@@ -23,6 +24,14 @@ __all__ = ["GuardCondition"]
 T = TypeVar("T")
 
 LONGEST = 3600.0  # s of one wait; a lock accepts no much larger number
+
+
+def check_callback(callback: object) -> None:
+    """Raise TypeError for what cannot be called."""
+    if not callable(callback):
+        hint = "; write the function's name without ()" if callback is None else ""
+        given = article(type(callback).__name__)
+        raise TypeError(f"a callback must be a function, and {callback!r} is {given}{hint}")
 
 
 def deadline(timeout_sec: float | None) -> float:

@@ -24,6 +24,10 @@ BODY = '<collision><origin xyz="0 0 0.02"/><geometry><box size="0.3 0.2 0.1"/>'
 SWAPPED = "<leftJoint>right_joint</leftJoint><rightJoint>left_joint<"
 PLUGIN = '<plugin name="drive" filename="libgazebo_ros_diff_drive.so">'
 
+SENSOR = (
+    '<gazebo reference="base"><sensor name="s" type="imu"><plugin name="i" filename="libgazebo_ros_imu_sensor.so">'
+    "<frame_name>footprnt</frame_name></plugin></sensor></gazebo>"
+)
 CONTROL = '<ros2_control name="x" type="system"><joint name="{}"/></ros2_control></robot>'
 NAMELESS = (
     '<visual><geometry><sphere radius="0.01"/></geometry><material name=""><color rgba="{}"/></material></visual>'
@@ -69,6 +73,7 @@ BROKEN = [
     ("tree", "</robot>", SECOND_PARENT + "</robot>", "two joints"),
     ("attribute", ARM_LIMIT, ARM_LIMIT.replace("/>", ' effrt="1"/>'), "write effort="),
     ("plugin-link", FRAME, FRAME + "<frameName>footprnt</frameName>", "write footprint"),
+    ("plugin-link", "</robot>", SENSOR + "</robot>", "write base, which has the sensor; links: "),
     ("unused-colour", "</robot>", '<material name="blue"><color rgba="0 0 1 1"/></material></robot>', "'blue'"),
     ("limit", ARM_LIMIT, "", "continuous"),
     ("limit-range", ARM_LIMIT, '<limit lower="1" upper="-1" effort="5" velocity="2"/>', "swap them"),
@@ -161,6 +166,7 @@ SPAWN_WARNS = [
     (PLUGIN, '<plugin name="x" filename="libgazebo_my.so"><max_x_velocity>1</max_x_velocity></plugin>' + PLUGIN),
     (PLUGIN, '<plugin name="x" filename="libgazebo_my.so"><some_joint>left_jiont</some_joint></plugin>' + PLUGIN),
     (PLUGIN, '<plugin name="x" filename="libgazebo_ros_p3d.so"/>' + PLUGIN),
+    (PLUGIN, PLUGIN + "<ros><remapping>cmd_vel=drive</remapping></ros>"),
     (PLUGIN, '<plugin name="x" filename="libhector_gazebo_ros_gps.so"/>' + PLUGIN),
     (FRAME, "<robotBaseFrame>/robot/footprint</robotBaseFrame>"),
     ('<inertia ixx="1e-6"', '<inertia ixx="1e-9"'),

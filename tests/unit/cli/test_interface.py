@@ -71,6 +71,18 @@ def test_a_package_that_is_given_is_listed_and_shown(lesson: Path, capsys: pytes
     assert run(capsys, "proto", "lesson/srv/NextGoal", *given) == "request_goal: 3\n"
 
 
+def test_packages_around_the_working_folder_are_listed(
+    lesson: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (lesson / "package.xml").write_text("<package><name>lesson</name></package>")
+    for folder in (lesson.parent, lesson, lesson / "srv"):
+        monkeypatch.chdir(folder)
+        assert "    lesson/srv/NextGoal\n" in run(capsys, "list")
+    assert cli.main(["interface", "show", "NextGoal"]) == 1
+    expected = "'NextGoal' has no package; write holozen/srv/NextGoal or lesson/srv/NextGoal"
+    assert capsys.readouterr().err == f"holozen interface show: {expected}\n"
+
+
 def test_nested_types_are_indented_below_their_field(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(capsys, "show", "geometry_msgs/msg/PoseStamped").splitlines() == [
         "std_msgs/Header header", "\tbuiltin_interfaces/Time stamp", "\t\tint32 sec", "\t\tuint32 nanosec",

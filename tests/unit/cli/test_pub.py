@@ -48,6 +48,17 @@ def test_json_and_yaml_are_read() -> None:
         assert read_message(text) == Twist.planar(0.3)
 
 
+def test_slips_of_yaml_are_named() -> None:
+    for text, hint in [
+        ("{linear: {x:0.1}}", "has no field 'linear.x:0.1'; write a space after ':'"),
+        ("linear:{x: 1}", "has no field 'linear:{x'; write a space after ':'"),
+        ("{linear: {x: 0,2}}", "has no field 'linear.2'; write a decimal point, not a comma"),
+        ("{linear: {x: 0,05, y: 0}}", "has no field 'linear.05'; write a decimal point, not a comma"),
+        ("{linear: {2: 1}}", "has no field 'linear.2'; it has x, y, z"),
+    ]:
+        assert refusal(text).endswith(hint)
+
+
 def test_the_first_kind_that_fits_is_taken() -> None:
     assert read_message("twist: {linear: {x: 1}}") == TwistStamped(twist=Twist.planar(1))
     assert read_message("{}") == Twist()

@@ -143,6 +143,9 @@ def test_a_wrong_line_of_a_nested_type_is_reported_with_its_place(lesson: Path) 
     (lesson / "msg" / "Spot.msg").write_text("# a spot\nflot64 x\n")
     message = refusal(Registry({"lesson": lesson}), "lesson/msg/Where")
     assert message.startswith(f"{lesson}/msg/Spot.msg:2: no type 'lesson/msg/flot64'")
+    (lesson / "msg" / "Spot.msg").write_text("float x\n")
+    message = refusal(Registry({"lesson": lesson}), "lesson/msg/Where")
+    assert message.endswith("/msg/Spot.msg:1: no type 'lesson/msg/float'; write float32 or float64")
 
 
 def test_what_is_no_definition_is_reported_with_its_file(lesson: Path) -> None:

@@ -71,9 +71,21 @@ def test_a_namespace_stands_before_relative_topics_only() -> None:
 
 def test_a_topic_is_remapped_by_its_default_name_and_by_its_own() -> None:
     assert drive("<ros><remapping>/cmd_vel:=go/</remapping></ros>").command_topic == "go"
-    own = "<commandTopic>/drive</commandTopic><ros><remapping>drive:=go</remapping><remapping>x:=y</remapping></ros>"
+    own = "<commandTopic>/drive</commandTopic><ros><remapping>drive:=go</remapping></ros>"
     assert drive(own).command_topic == "go"
-    assert drive("<ros><remapping>cmd_vel:=</remapping></ros>").command_topic == "cmd_vel"
+
+
+def test_a_remapping_without_effect_is_warned_of() -> None:
+    for remapping, problem in [
+        ("cmd_vel=go", "is 'cmd_vel=go', which renames nothing; write OLD:=NEW, as cmd_vel:=my_vel"),
+        ("cmd_vel:=", "is 'cmd_vel:=', which renames nothing"),
+        ("cmd_vl:=go", "renames 'cmd_vl', which is no topic of this plugin (did you mean 'cmd_vel'?); topics: cmd_vel"),
+    ]:
+        model = robot(plugin(f"<ros><remapping>{remapping}</remapping></ros>"))
+        assert model.drive is not None and model.drive.command_topic == "cmd_vel"
+        (warning,) = model.warnings
+        assert warning.startswith(f"{ORIGIN}, line 3: <remapping> of <plugin name='drive'> {problem}")
+    assert robot(plugin("<ros><remapping>tf:=my_tf</remapping><remapping>odom:=here</remapping></ros>")).warnings == ()
 
 
 def test_spellings_that_people_use_are_understood() -> None:
@@ -177,6 +189,7 @@ def test_a_value_that_cannot_be_is_refused_with_its_tag() -> None:
             "<cmdTimeout> of <plugin name='drive'> is '0'; it must be a number above 0",
         ),
         ("<cmdTimeout>inf</cmdTimeout>", "is 'inf'"),
+        ("<update_rate>fast</update_rate>", "is 'fast'; it must be a number not below 0"),
         ("<covariance_x>-1</covariance_x>", "is '-1'; it must be a number not below 0"),
         ("<publish_odom>perhaps</publish_odom>", "is 'perhaps'; it must be true or false"),
         ("<commandTopic>*</commandTopic>", "<commandTopic> of <plugin name='drive'> makes the topic '*'"),

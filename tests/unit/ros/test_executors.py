@@ -111,6 +111,18 @@ def test_an_executor_that_is_shut_down_spins_no_more(ros: Wire) -> None:
     assert node.executor is None
 
 
+def test_what_is_no_node_is_not_spun(ros: Wire) -> None:
+    class Tom(rclpy.node.Node):
+        pass
+
+    for given, expected in [
+        (Tom, r"^pass a node, such as Tom\(\), not the class$"),
+        (None, r"^pass a node, such as MyNode\(\), not None$"),
+    ]:
+        with pytest.raises(TypeError, match=expected):
+            rclpy.spin(given)  # type: ignore[arg-type]
+
+
 def test_no_executor_without_a_running_context() -> None:
     with pytest.raises(RCLError, match="failed to create an executor: rclpy is not running"):
         SingleThreadedExecutor(context=Context())

@@ -96,6 +96,8 @@ def test_what_is_wrong_is_refused_and_leaves_nothing(ros: Wire) -> None:
         (lambda node: node.create_publisher(Twist(), "a", 1), AttributeError),
         (lambda node: node.create_service(Twist, "a", print), AttributeError),
         (lambda node: node.create_client(3, "a"), AttributeError),
+        (lambda node: node.create_service(Trigger, "a", None), TypeError),
+        (lambda node: node.create_timer(1, None), TypeError),
     ]
     for make, error in rows:
         with pytest.raises(error):

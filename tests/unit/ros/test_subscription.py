@@ -169,6 +169,8 @@ def test_a_callback_that_takes_no_message_is_refused(ros: Wire) -> None:
         node.create_subscription(Twist, "a", lambda: None, 10)
     with pytest.raises(TypeError, match=r"^a callback must be a function, and 3 is an int$"):
         node.create_subscription(Twist, "a", 3, 10)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match=r"and None is a NoneType; write the function's name without \(\)$"):
+        node.create_subscription(Twist, "a", None, 10)  # type: ignore[arg-type]
 
 
 def test_a_destroyed_one_hears_nothing_while_data_come(ros: Wire, spin_for: Spin) -> None:
