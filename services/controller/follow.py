@@ -26,12 +26,13 @@ NOTICE = 3.0  # s without any odom after which it reports the robots that there 
 LARGEST_GOAL = 65_536  # bytes
 MAX_DISTANCE = 1e6  # m; farther goals and poses are errors
 LOST = 2.0  # s without fresh odom, after which the goal of an action is aborted; the robot has stopped long before
-SUSPENDED = 2.0  # s between two looks at the goals that mean that this process was suspended
+SUSPENDED = 2.0  # s between two looks at the goals, or without odom: this process, or a link, was held up
 CATCHING_UP = 0.5  # s after that in which goals still arrive that were sent before
 FRAMES = ("", "odom", "map", "world")  # frames of a goal that all mean the frame of odom
 GOAL = "a goal of "
 ENDS = "the controller ends"
 LATE = "the controller was suspended when it was sent; send it again"
+HELD_UP = "no odom came before it, so a link may have held it up; send it again once odom comes"
 REMOVED = "the robot was removed or replaced, or the link to it was lost"
 RESET = "the robot was reset or moved"
 ONLY_TURNS = "this robot cannot strafe: its drive only goes forward, backward and turns; it may miss goals beside it"
@@ -104,6 +105,7 @@ class Follower:
         self._commands: Publisher[Twist] = bus.publisher(key_for("cmd_vel", robot), Twist, PRIORITY_OF["controller"])
         self._goals = bus.subscribe(key_for("goal_pose", robot), PoseStamped, depth=1, limit=LARGEST_GOAL)
         self._wanted: Journey | None = None  # the present one, of goal_pose or an action
+        self._late = LATE  # why a goal that came by then is refused
         self._looked, self._caught_up = math.inf, -math.inf  # s; for goals, and until when old ones may arrive
         self._actions = GoalServers(bus, robot, self._refusal, report)
         self._seen = time.monotonic()  # s; the time of the last fresh odom, or of the start of the journey
@@ -152,14 +154,17 @@ class Follower:
 
     def _newest_journey(self) -> Journey | None:
         """The newest journey of goal_pose or an action. A new one ends the one before. A goal that may have waited for
-        this process is refused: what happened to the robot meanwhile is unknown.
+        this process, or in a link, is refused: what happened to the robot meanwhile is unknown.
         """
         before, self._looked = self._looked, time.monotonic()
         if self._looked - before > SUSPENDED:
-            self._caught_up = self._looked + CATCHING_UP
+            self._caught_up, self._late = self._looked + CATCHING_UP, LATE
+        elif self._odom.count and self._odom.read()[1] > self._odom.patience(SUSPENDED):
+            # The next look may be as far away as two attempts to reach a service.
+            self._caught_up, self._late = self._looked + CATCHING_UP + 2 * PATIENCE, HELD_UP
         received = self._goals.try_recv()
         if received is not None:
-            late = LATE if self._looked < self._caught_up else ""
+            late = self._late if self._looked < self._caught_up else ""
             if reason := received.error or late or (received.message and self._refusal(received.message)):
                 self._report(f"goal_pose: refused: {reason}")
             elif goal := received.message:

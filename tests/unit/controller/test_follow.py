@@ -36,7 +36,7 @@ from holozen.testing import Wire, wait_for
 from holozen.transport.actions import State
 from holozen.transport.errors import ServiceError
 from holozen.transport.pubsub import Publisher, Subscription
-from services.controller.follow import Follower
+from services.controller.follow import HELD_UP, Follower
 from services.controller.goto import Gains, Leg
 
 QUICK = Gains(max_speed=2, max_turn=5, max_acceleration=10, max_turn_acceleration=20, linear=3, angular=3)
@@ -383,6 +383,30 @@ def test_a_goal_that_waited_for_a_suspended_controller_is_refused(case: Case, mo
     wait_for(lambda: "goal_pose: refused: the controller was suspended when it was sent; send it again" in case.reports)
     case.goals()
     assert [leg.goal for leg in lap.result(30)] == GOALS
+
+
+def test_a_goal_that_a_link_may_have_held_up_is_refused(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("services.controller.follow.SUSPENDED", 1.5)
+    case.lap()
+
+    goals = case.robot.bus.publisher("goal_pose", PoseStamped)
+
+    def send_until(reported: str) -> None:
+        seen = len(case.reports)
+
+        def is_reported() -> bool:
+            goals.put(PoseStamped(pose=Pose(Point(9.0))))
+            return any(report.startswith(reported) for report in case.reports[seen:])
+
+        wait_for(is_reported, what=reported)
+
+    send_until("goal_pose: (9.00, ")
+    case.robot.moving.clear()
+    send_until(f"goal_pose: refused: {HELD_UP}")
+    heard = len(case.robot.heard)
+    case.robot.moving.set()
+    send_until("goal_pose: (9.00, ")
+    wait_for(lambda: len(case.robot.heard) > heard)
 
 
 def test_a_goal_of_goal_pose_waits_while_another_drives(case: Case) -> None:
