@@ -92,7 +92,9 @@ def _run(
                 feedback.report_held()
     if args.json:
         print(json.dumps({"key": args.key, "type": form.kind.name, "subscribers": matched, "published": sent}))
-    return int(bool(feedback and feedback.refusal and (args.once or args.times) and payload not in form.stops))
+    if not (feedback and feedback.refusal and (args.once or args.times)):
+        return 0
+    return int(payload not in form.stops or not feedback.stands)
 
 
 def _form(args: argparse.Namespace) -> Form | None:

@@ -11,13 +11,14 @@ from holozen import wire
 from holozen.bus import Latest
 from holozen.console import report as report_line
 
-FRESH = 1.0  # s; an older status is ignored
+FRESH = 1.0  # s; after that a robot whose status came is gone
 COVERED = 3  # statuses after a command, of which the last was sent after the command has been read
 HOLDING = 0.3  # s within which a status tells who is held after a stop; it comes at 10 Hz
 VELOCITIES = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
 LIMITED = "over the limits"  # prefix of the sim's reason when it drives slower than commanded
 OVERRULED = "overruled"  # prefix of its reason when a higher source drives
 DRIVES = " drives"
+SILENT = "its status no longer comes: its sim has ended, hangs, or cannot be reached"
 ONLY_TURNS = "linear.y is ignored: this robot's drive only goes forward, backward and turns"
 HELD = "held, since another source took over"
 RESUME = "; `{command}` lets it drive again"
@@ -81,13 +82,17 @@ class CommandFeedback:
         """Whether the commands have a sideways part, which not every drive can make."""
         self.refusal = ""
         """Why the robot does not obey, by the latest look; empty if it does, or is not known to."""
+        self.stands = False
+        """Whether it is certain that no source drives the robot, by the latest look."""
 
     def look(self) -> bool:
         """Report any change; returns whether the sim has judged the commands yet."""
         status, age = self._latest.read()
-        if not status or age >= FRESH or (why := self._verdict(status)) is None:
+        why = (self._verdict(status) if age < FRESH else SILENT) if status else None
+        if not status or why is None:
             return False
         self._driver = status.obeyed if why.endswith(DRIVES) else ""
+        self.stands = age < FRESH and bool(status.stopped or not status.obeyed)
         if why != self._reported:
             if why and not why.startswith(LIMITED):
                 resume = RESUME.format(command=self._resume) if why == HELD else ""

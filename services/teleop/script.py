@@ -132,6 +132,8 @@ def _not_obeyed(session: Session, status: CommandStatus) -> str:
         return f"stopped by {status.stopped}; `holozen release` lets the robot drive again"
     if not any(session.mapper.motion):
         return ""
+    if session.client.odom.is_paused:
+        return "the sim is paused; `holozen sim play` continues it"
     if any(source.held for source in status.sources if source.source == session.bus.source):
         command = resume_command(session.client.key.rpartition("/")[0])
         return f"the robot was stopped or taken over; `{command}` gives it back"

@@ -8,7 +8,7 @@ import pytest
 from holozen.background import background
 from holozen.bus import Bus
 from holozen.cli.publish import LEFT
-from holozen.command.feedback import HELD, ONLY_TURNS, verdict, verdict_on_part
+from holozen.command.feedback import HELD, ONLY_TURNS, SILENT, verdict, verdict_on_part
 from holozen.messages import CommandSource, CommandStatus, Twist
 from holozen.testing import Wire, wait_for
 
@@ -55,8 +55,10 @@ def test_a_command_to_a_joint_that_is_accepted_after_a_refusal_is_obeyed() -> No
         assert verdict_on_part(status, before, ME) == why
 
 
-def once(wire: Wire, run: Run, judged: Callable[[str], CommandStatus], value: str = "{}") -> str:
-    """What `pub --once` reports of a value beside a sim that the teleop drives, whose next status `judged` gives."""
+def once(wire: Wire, run: Run, judged: Callable[[str], CommandStatus], value: str = "{}", code: int = 0) -> str:
+    """What `pub --once` reports of a value beside a sim that the teleop drives, whose next status `judged` gives. It
+    ends with `code`.
+    """
     sim: Bus = wire.bus("sim")
     commands, statuses = sim.subscribe("cmd_vel", Twist), sim.publisher("cmd_vel_status", CommandStatus)
     statuses.put(CommandStatus(obeyed=TELEOP))
@@ -68,10 +70,10 @@ def once(wire: Wire, run: Run, judged: Callable[[str], CommandStatus], value: st
 
     with ThreadPoolExecutor() as pool:
         answered = pool.submit(answer)
-        code, _, err = run("topic", "pub", "cmd_vel", value, "--once")
+        ended, _, err = run("topic", "pub", "cmd_vel", value, "--once")
         answered.result(10)
     sim.close()  # the next command is not for it
-    assert code == 0
+    assert ended == code
     return err
 
 
@@ -87,7 +89,7 @@ def test_a_single_command_that_is_not_obeyed_is_reported(wire: Wire, run: Run) -
     teleop.publisher("cmd_vel", Twist)
 
     def reported() -> str:
-        return once(wire, run, lambda source: CommandStatus(teleop.source, sources=[CommandSource(source)]))
+        return once(wire, run, lambda source: CommandStatus(teleop.source, sources=[CommandSource(source)]), code=1)
 
     assert reported().splitlines()[-1] == f"not obeyed: {teleop.source} drives"
     teleop.close()
@@ -108,6 +110,25 @@ def test_a_sideways_command_to_a_robot_that_cannot_strafe_is_noted(wire: Wire, r
 def test_a_single_command_that_is_held_is_reported_with_what_lets_it_drive(wire: Wire, run: Run) -> None:
     reported = once(wire, run, lambda source: CommandStatus(sources=[CommandSource(source, held=True)]))
     assert reported.splitlines()[-1] == f"not obeyed: {HELD}; `holozen controller --resume` lets it drive again"
+
+
+def test_a_stop_that_is_refused_where_nothing_drives_is_no_failure(wire: Wire, run: Run) -> None:
+    reported = once(wire, run, lambda source: CommandStatus(stopped=TELEOP, sources=[CommandSource(source)]))
+    assert reported.splitlines()[-1] == f"not obeyed: {TELEOP} has set the software stop"
+
+
+def test_a_robot_that_is_gone_is_reported(wire: Wire, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("holozen.command.feedback.FRESH", 0.2)
+    sim = wire.bus("sim")
+    commands, statuses = sim.subscribe("cmd_vel", Twist), sim.publisher("cmd_vel_status", CommandStatus)
+
+    def answer() -> None:
+        source = commands.recv().source
+        statuses.put(CommandStatus(source))
+
+    background(answer)
+    code, _, err = run("topic", "pub", "cmd_vel", "{linear: {x: 0.2}}", "--times", "60", "-r", "100")
+    assert (code, err.splitlines()[1:]) == (1, [f"not obeyed: {SILENT}"])
 
 
 def test_a_stop_at_the_end_that_holds_another_source_is_reported(wire: Wire, run: Run) -> None:

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from holozen.messages import CommandSource, CommandStatus, Twist
+from holozen.background import background
+from holozen.messages import CommandSource, CommandStatus, SimulationStatus, Twist
+from holozen.messages.simulation_interfaces import SimulationState
 from holozen.testing import Wire, wait_for
 from holozen.transport.pubsub import Subscription
 from services.teleop import script
@@ -121,6 +123,20 @@ def test_a_stopped_script_breaks_off(wire: Wire) -> None:
     wait_for(lambda: session.client.status().sources)
     expected = script.run(parse("60s i"), session, threading.Event())
     assert expected == "the robot was stopped or taken over; `holozen controller Fred --resume` gives it back"
+
+
+def test_a_script_breaks_off_in_a_paused_sim(session: Session, wire: Wire) -> None:
+    status, ended = wire.bus("sim").publisher("simulation_status", SimulationStatus), threading.Event()
+
+    def pause() -> None:
+        while not ended.wait(0.05):
+            status.put(SimulationStatus(SimulationState.STATE_PAUSED))
+
+    background(pause)
+    wait_for(lambda: session.client.odom.is_paused)
+    expected = script.run(parse("60s i"), session, threading.Event())
+    ended.set()
+    assert expected == "the sim is paused; `holozen sim play` continues it"
 
 
 @pytest.mark.parametrize("words", [["--mode", "latch"], ["--key-timeout", "0"]])
