@@ -14,7 +14,7 @@ import time
 import weakref
 from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, Self, TypeVar
 
 import zenoh
 
@@ -27,6 +27,7 @@ from holozen.transport.graph import Graph, NodeInfo, Peers
 from holozen.transport.samples import Declared, RawSubscriber, Replies, Sample, source
 from holozen.transport.session import (
     CLOSE_LIMIT,
+    FORKED,
     MAX_TOKENS,
     Opening,
     join_at_end,
@@ -52,7 +53,19 @@ LONGEST_NAME = 255  # characters of a node's name, as in ROS
 _NAME = re.compile(r"[\w.-]+(?:[ /][\w.-]+)*")
 
 _open: weakref.WeakSet[Node] = weakref.WeakSet()
-os.register_at_fork(after_in_child=_open.clear)  # they are the parent's
+_of_parents: list[Any] = []  # what Zenoh made in a parent process: to free it here would wait for threads there
+
+
+def _leave_to_parent() -> None:
+    """Refuse to use the nodes in a process that was forked from theirs. Zenoh's threads are not in it, so it would send
+    nothing, and wait for ever.
+    """
+    for node in list(_open):
+        node.leave_to_parent()
+    _open.clear()
+
+
+os.register_at_fork(after_in_child=_leave_to_parent)
 
 
 @atexit.register
@@ -196,6 +209,17 @@ class Node:
             with contextlib.suppress(Exception):  # closed, or in use, by another thread
                 one.close()
         self.close_session()
+
+    def leave_to_parent(self) -> None:
+        """Raise BusError at each use from now on, in a process that was forked from this node's."""
+
+        def refuse(*_words: Any, **_flags: Any) -> NoReturn:
+            raise BusError(FORKED)
+
+        _of_parents.append((self._opened, self._declared))
+        self._opened, self._declared = refuse, set()
+        for one in _of_parents[-1][1]:
+            one.leave_to_parent(refuse)
 
     def close_session(self) -> None:
         """Close the session alone; what is declared is not withdrawn first."""

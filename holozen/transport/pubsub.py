@@ -90,6 +90,10 @@ class RawPublisher(Declared):
         if self._next is not None and not self._next.is_set():
             self._next.set()
 
+    def leave_to_parent(self, refuse: Callable[..., Any]) -> None:
+        """Send no more."""
+        self._put = refuse
+
     def want(self) -> None:
         """Let the next message be sent also without subscribers: a get waits for it."""
         if self._next is not None:

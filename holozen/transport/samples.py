@@ -8,6 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 from holozen.console import report
@@ -221,6 +222,9 @@ class Declared:
         for end in reversed(ends):
             end.undeclare()
 
+    def leave_to_parent(self, refuse: Callable[..., Any]) -> None:
+        """Let each use call `refuse`, in a process that was forked from the one that has declared this."""
+
     @contextlib.contextmanager
     def unless_closed(self) -> Iterator[None]:
         """Convert any error to a BusError once this is closed."""
@@ -336,6 +340,10 @@ class RawSubscriber(Declared):
         self.channel, self.limit = subscriber.handler, limit
         self._reads = 0  # the number of `thread`, which is found in half the time
 
+    def leave_to_parent(self, refuse: Callable[..., Any]) -> None:
+        """Receive no more."""
+        self.channel = SimpleNamespace(recv=refuse, try_recv=refuse)
+
     def try_recv(self) -> Sample | None:
         """The next waiting sample, or None."""
         sample = self.channel.try_recv()
@@ -351,6 +359,8 @@ class RawSubscriber(Declared):
             self._reads, self.thread = thread, threading.current_thread()
         try:
             return self.channel.recv()
+        except BusError:
+            raise
         except Exception:  # a ZError: the session is closed. Zenoh is imported later than this module
             raise BusError("closed") from None
 

@@ -27,7 +27,7 @@ CLOSE_LIMIT = 0.15  # s; a session whose peer hangs would take 10 s to close
 
 
 FORKED = (
-    "cannot open Zenoh in a process that was forked from one which has used it: start it by multiprocessing's "
+    "cannot use Zenoh in a process that was forked from one which has used it: start it by multiprocessing's "
     '"spawn" method, or fork before the first Bus'
 )
 _process = 0  # the one that has used Zenoh: its threads are not in those that are forked from it
