@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
+from holozen.cli import ELSEWHERE
 from holozen.flags import Parser, count, key, number
 from holozen.process import deferred_interrupt
 from holozen.suggest import suggest
@@ -40,6 +41,7 @@ _ROS2 = {
     "launch": ("-n", "--noninteractive", "-d", "--debug", "-a", "--show-all-subprocesses-output"),
     "node list": ("-a", "--all"), "node info": ("--include-hidden",), "param list": (_NODES,), "param get": (_NODES,),
     "param set": (_NODES,), "param describe": (_NODES,), "param dump": (_NODES,), "param load": (_NODES,),
+    "xacro": ("--inorder",), "doctor": ("-r", "--report", "--include-warnings"),
 }  # fmt: skip
 
 DURABILITIES = ("system_default", "transient_local", "volatile", "unknown", "best_available")
@@ -126,6 +128,8 @@ class Noun:
         """Run the verb that `argv` starts with."""
         if argv and argv[0] in self.modules:
             return self.verb(argv[0]).main(argv[1:])
+        if instead := ELSEWHERE.get(" ".join([self.name, *argv[:1]])):
+            self.parser().error(f"no verb {argv[0]!r}; {instead}")
         self.parser().parse_args(argv)
         return 2
 
