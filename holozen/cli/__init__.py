@@ -56,9 +56,6 @@ ELSEWHERE = {
     "rviz": _DRAWS, "rviz2": _DRAWS, "rqt": _DRAWS, "foxglove": _DRAWS, "rqt_plot": _DRAWS,
     "pkg": "`holozen new package` writes one; `--package NAME=DIR` gives the folder of a package",
     "control": "the sim moves joints itself, by the key joint_command", "multicast": "write `holozen doctor`",
-    "interface package": "write `holozen interface list`", "interface packages": "write `holozen interface list`",
-    "param delete": "a parameter is there as long as its node", "service echo": "services cannot be watched here",
-    "tf view_frames": "`holozen view` draws the frames", "tf monitor": "write `holozen topic hz tf`",
     "tf2_echo": "write `holozen tf echo SOURCE TARGET`", "tf2": "write `holozen tf`",
     "rqt_graph": "write `holozen graph`", "wtf": "write `holozen doctor`", "msg": _TYPES, "srv": _TYPES,
     "gazebo": "write `holozen sim`", "gz": "write `holozen sim`", "teleop_twist_keyboard": "write `holozen teleop`",
@@ -69,7 +66,7 @@ ELSEWHERE = {
     "rosparam": "write `holozen param`", "rosbag": "write `holozen bag`", "rosrun": "write `holozen run`",
     "roslaunch": "write `holozen launch`", "roscore": "none is needed; `holozen up` starts a robot",
 }  # fmt: skip
-"""Verbs of ROS's tools and other likely guesses, some behind a noun of ours, with what to use instead."""
+"""Verbs of ROS's tools and other likely guesses, with what to use instead."""
 EXTRAS = (
     "PIL", "cryptography", "foxglove", "lz4", "matplotlib", "mcap", "mujoco", "numpy", "pybullet", "transforms3d",
     "viser", "websockets", "xacro", "zstandard",

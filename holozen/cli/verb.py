@@ -9,7 +9,6 @@ import threading
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
-from holozen.cli import ELSEWHERE
 from holozen.flags import Parser, count, key, number
 from holozen.process import deferred_interrupt
 from holozen.suggest import suggest
@@ -43,6 +42,13 @@ _ROS2 = {
     "param set": (_NODES,), "param describe": (_NODES,), "param dump": (_NODES,), "param load": (_NODES,),
     "xacro": ("--inorder",), "doctor": ("-r", "--report", "--include-warnings"),
 }  # fmt: skip
+
+ELSEWHERE = {
+    "interface package": "write `holozen interface list`", "interface packages": "write `holozen interface list`",
+    "param delete": "a parameter is there as long as its node", "service echo": "services cannot be watched here",
+    "tf view_frames": "`holozen view` draws the frames", "tf monitor": "write `holozen topic hz tf`",
+}  # fmt: skip
+"""Verbs of ros2 behind our nouns, with what to use instead."""
 
 DURABILITIES = ("system_default", "transient_local", "volatile", "unknown", "best_available")
 _POLICIES = {

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from holozen import cli
-from holozen.cli.verb import Noun, Service
+from holozen.cli.verb import ELSEWHERE, Noun, Service
 from holozen.transport.errors import BusError
 
 
@@ -58,9 +58,9 @@ def test_doctor_takes_the_flags_of_ros2() -> None:
 
 
 def test_what_there_is_instead_of_a_verb_is_there() -> None:
-    for text in cli.ELSEWHERE.values():
-        for verb in re.findall(r"`holozen (\w+)", text):
-            assert verb in cli.VERBS
+    for text in (*cli.ELSEWHERE.values(), *ELSEWHERE.values()):
+        for name in re.findall(r"`holozen (\w+)", text):
+            assert name in cli.VERBS
 
 
 NOUNS = cli.NOUNS
