@@ -54,7 +54,8 @@ _DRAWS = "`holozen view` shows robots in a browser, `holozen map` and `holozen p
 _TYPES = "`holozen interface` shows messages, services and actions"
 ELSEWHERE = {
     "rviz": _DRAWS, "rviz2": _DRAWS, "rqt": _DRAWS, "foxglove": _DRAWS, "rqt_plot": _DRAWS,
-    "pkg": "`--package NAME=DIR` gives the folder of a package",
+    "pkg": "`holozen new package` writes one; `--package NAME=DIR` gives the folder of a package",
+    "control": "the sim moves joints itself, by the key joint_command", "multicast": "write `holozen doctor`",
     "tf2_echo": "write `holozen tf echo SOURCE TARGET`", "tf2": "write `holozen tf`",
     "rqt_graph": "write `holozen graph`", "wtf": "write `holozen doctor`", "msg": _TYPES, "srv": _TYPES,
     "gazebo": "write `holozen sim`", "gz": "write `holozen sim`", "teleop_twist_keyboard": "write `holozen teleop`",

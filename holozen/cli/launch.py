@@ -1,6 +1,7 @@
 """`holozen launch`: run a Python launch file that was written for ROS 2, without ROS."""
 
 import argparse
+import contextlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING, NoReturn
 from holozen import flags
 from holozen.cli.verb import Verb, by_name
 from holozen.console import Failure, report
+from holozen.robot.errors import RobotError
 from holozen.suggest import suggest
 from holozen.transport import connection
 
@@ -78,11 +80,11 @@ def _file(words: list[str], refuse: Callable[[str], NoReturn]) -> Path:
 
     if meant := flags.assigned(words[1:]):
         refuse(f"{meant.replace(':=', '=', 1)!r}: write {meant}")
-    if len(words) == 1:
+    if len(words) == 1 and not _is_package(words[0]):
         return Path(words[0]).expanduser()
-    if len(words) != 2:
+    if len(words) not in (1, 2):
         refuse(f"give FILE, or PACKAGE FILE, not {' '.join(words) or 'nothing'!r}")
-    package, name = words
+    package, name = words[0], "".join(words[1:])
     folder = packages.find(package)
     if folder == packages.stand_ins.get(package):
         return folder / "launch" / name
@@ -90,9 +92,21 @@ def _file(words: list[str], refuse: Callable[[str], NoReturn]) -> Path:
     found = next((file for file in files if file.name == name), None)
     if found is None:
         names = [file.name for file in files if file.suffix == ".py"]
+        if not name:
+            raise NotFound(f"{package} is a package; give one of its launch files too: {', '.join(names) or 'none'}")
         hint = suggest(name, names) or f"; there are {', '.join(names) or 'none'}"
         raise NotFound(f"no launch file {name!r} in {folder / 'launch'}{hint}")
     return found
+
+
+def _is_package(word: str) -> bool:
+    from holozen.ros import packages
+
+    if Path(word).is_file() or not word.isidentifier():
+        return False
+    with contextlib.suppress(RobotError):
+        return bool(packages.find(word, nameless=False))
+    return False
 
 
 def _show(description: "LaunchDescription") -> int:

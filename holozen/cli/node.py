@@ -12,9 +12,11 @@ from holozen.cli.verb import Noun, Verb, add_count, argument, by_name, open_bus
 from holozen.console import Failure, printable, report
 from holozen.flags import key
 from holozen.suggest import listed, suggest
+from holozen.transport.actions import BELOW, found_in
 from holozen.transport.graph import Endpoint, includes
 
-TITLES = {"sub": "Subscribers", "pub": "Publishers", "srv": "Service Servers"}
+TITLES = {"subscribers": "Subscribers", "publishers": "Publishers", "services": "Service Servers"}
+TITLES |= {"action_servers": "Action Servers", "action_clients": "Action Clients"}
 
 
 def list_nodes(args: argparse.Namespace) -> int:
@@ -44,18 +46,20 @@ def info(args: argparse.Namespace) -> int:
 
 
 def _print_node(name: str, ends: list[Endpoint], as_json: bool) -> None:
-    shown = [end for end in ends if not is_any(end)]
-    kinds = {kind: [{"key": end.key, "type": end.type} for end in shown if end.kind == kind] for kind in TITLES}
+    parts = {"sub": "subscribers", "pub": "publishers", "srv": "services"}
+    shown = [end for end in ends if end.kind in parts and not (is_any(end) or f"/{BELOW}/" in end.key)]
+    rows = [(parts[end.kind], end.key, end.type) for end in shown]
+    rows += [("action_servers" if one.is_server else "action_clients", one.key, one.type) for one in found_in(ends)]
+    named = {part: [{"key": key, "type": type} for where, key, type in rows if where == part] for part in TITLES}
     session = ends[0].session
     if as_json:
-        named = {"subscribers": kinds["sub"], "publishers": kinds["pub"], "services": kinds["srv"]}
         print(json.dumps({"node": name, "session": session, **named}))
         return
     print(printable(f"{name} ({session[:6]})"))
-    for kind, title in TITLES.items():
+    for part, title in TITLES.items():
         print(f"  {title}:")
-        for end in kinds[kind]:
-            print(printable(f"    {end['key']}: {end['type']}"))
+        for row in named[part]:
+            print(printable(f"    {row['key']}: {row['type']}"))
 
 
 def graph(args: argparse.Namespace) -> int:

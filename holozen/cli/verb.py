@@ -40,7 +40,15 @@ _ROS2 = {
     "launch": ("-n", "--noninteractive", "-d", "--debug", "-a", "--show-all-subprocesses-output"),
     "node list": ("-a", "--all"), "node info": ("--include-hidden",), "param list": (_NODES,), "param get": (_NODES,),
     "param set": (_NODES,), "param describe": (_NODES,), "param dump": (_NODES,), "param load": (_NODES,),
+    "xacro": ("--inorder",), "doctor": ("-r", "--report", "--include-warnings"),
 }  # fmt: skip
+
+ELSEWHERE = {
+    "interface package": "write `holozen interface list`", "interface packages": "write `holozen interface list`",
+    "param delete": "a parameter is there as long as its node", "service echo": "services cannot be watched here",
+    "tf view_frames": "`holozen view` draws the frames", "tf monitor": "write `holozen topic hz tf`",
+}  # fmt: skip
+"""Verbs of ros2 behind our nouns, with what to use instead."""
 
 DURABILITIES = ("system_default", "transient_local", "volatile", "unknown", "best_available")
 _POLICIES = {
@@ -120,6 +128,8 @@ class Noun:
         """Run the verb that `argv` starts with."""
         if argv and argv[0] in self.modules:
             return self.verb(argv[0]).main(argv[1:])
+        if instead := ELSEWHERE.get(" ".join([self.name, *argv[:1]])):
+            self.parser().error(f"no verb {argv[0]!r}; {instead}")
         self.parser().parse_args(argv)
         return 2
 

@@ -191,7 +191,8 @@ class Trace:
             return
         del self.calls[depth:]
         if unknown:
-            error.hint = suggest(node.tagName[6:], names(macros))
+            bare = any(each.getAttribute("name") == node.tagName[6:] for each in _plain_macros(node.ownerDocument))
+            error.hint = PLAIN_MACRO if bare else suggest(node.tagName[6:], names(macros))
             return
         params = [param.lstrip("*") for param in error.macros[0].params]
         wrong = words.split('"')[1] if words.startswith("Invalid parameter ") else ""
@@ -223,7 +224,8 @@ class Trace:
                 return function(text, *tables)
             except NameError as error:
                 if error.name and tables and not hasattr(error, "hint"):
-                    error.hint = suggest(error.name, names(tables[0]))  # type: ignore[attr-defined]
+                    near = _in_plain_macro(self._element) or suggest(error.name, names(tables[0]))
+                    error.hint = near  # type: ignore[attr-defined]
                 raise
             except TypeError as error:
                 if tables and not hasattr(error, "hint"):
@@ -231,6 +233,20 @@ class Trace:
                 raise
 
         return wrapped
+
+
+PLAIN_MACRO = "; <macro> lacks its prefix: write <xacro:macro ...> ... </xacro:macro>"
+
+
+def _plain_macros(document: Any) -> Any:
+    return document.getElementsByTagName("macro") if document else ()
+
+
+def _in_plain_macro(node: Any) -> str:
+    """A hint for an expression inside a `<macro>`, which defines none, so that its parameters have no values."""
+    while node is not None and node.nodeName != "macro":
+        node = node.parentNode
+    return PLAIN_MACRO if node is not None else ""
 
 
 def _no_number(expression: str, table: Any) -> str:

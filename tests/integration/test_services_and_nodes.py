@@ -220,9 +220,13 @@ def test_node_info_shows_what_a_node_reads_writes_and_serves(town: Wire) -> None
     lines = town.run("node", "info", "sim").stdout.splitlines()
     assert lines[1:3] == ["  Subscribers:", "    cmd_vel: geometry_msgs/msg/Twist"]
     assert "    odom: nav_msgs/msg/Odometry" in lines[lines.index("  Publishers:") : lines.index("  Service Servers:")]
-    assert "    resume: std_srvs/srv/Trigger" in lines[lines.index("  Service Servers:") :]
+    servers = lines.index("  Action Servers:")
+    assert "    resume: std_srvs/srv/Trigger" in lines[lines.index("  Service Servers:") : servers]
+    assert lines[servers + 1] == "    simulate_steps: simulation_interfaces/action/SimulateSteps"
+    assert not any("_action" in line for line in lines)
     output = json.loads(town.run("node", "info", "/sim", "--json").stdout)
     assert {"key": "odom", "type": "nav_msgs/msg/Odometry"} in output["publishers"]
+    assert [row["key"] for row in output["action_servers"]] == ["simulate_steps"]
 
 
 def test_lists_count_and_write_json(town: Wire) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from holozen import cli
-from holozen.cli.verb import Noun, Service
+from holozen.cli.verb import ELSEWHERE, Noun, Service
 from holozen.transport.errors import BusError
 
 
@@ -43,7 +43,8 @@ def test_an_unknown_verb_gets_the_nearest_or_what_there_is_instead(capsys: pytes
     for word, hint in [
         ("topics", " (did you mean 'topic'?)"),
         ("rviz2", "; `holozen view` shows robots in a browser"),
-        ("pkg", "; `--package NAME=DIR`"),
+        ("pkg", "; `holozen new package` writes one; `--package NAME=DIR`"),
+        ("control", "; the sim moves joints itself, by the key joint_command"),
         ("tf2_echo", "; write `holozen tf echo SOURCE TARGET`"),
     ]:
         assert cli.main([word]) == 2
@@ -52,10 +53,14 @@ def test_an_unknown_verb_gets_the_nearest_or_what_there_is_instead(capsys: pytes
         assert (message.count("\n"), len(message) < 160) == (1, True)
 
 
+def test_doctor_takes_the_flags_of_ros2() -> None:
+    cli.command("doctor").parser().parse_args(["--report", "-r", "--include-warnings"])
+
+
 def test_what_there_is_instead_of_a_verb_is_there() -> None:
-    for text in cli.ELSEWHERE.values():
-        for verb in re.findall(r"`holozen (\w+)", text):
-            assert verb in cli.VERBS
+    for text in (*cli.ELSEWHERE.values(), *ELSEWHERE.values()):
+        for name in re.findall(r"`holozen (\w+)", text):
+            assert name in cli.VERBS
 
 
 NOUNS = cli.NOUNS

@@ -80,6 +80,8 @@ def test_a_wrong_word_is_reported_with_the_closest(run: Run) -> None:
         ("bag play x -p", "holozen bag play: --start-paused needs a terminal, in which space goes on; "),
         ("bag record -a --topics odom", "holozen bag record: give keys or -a, not both; "),
         ("record -a odom", "holozen record: give keys or -a, not both; "),
+        ("tf view_frames", "holozen tf: no verb 'view_frames'; `holozen view` draws the frames; see `holo"),
+        ("interface package std_msgs", "holozen interface: no verb 'package'; write `holozen interface list`; "),
         ("spawn", "holozen spawn: give the FILE of a robot or object; "),
         ("completion tcsh", "holozen completion: argument shell: 'tcsh'; there are bash, zsh, fish; "),
     ]:

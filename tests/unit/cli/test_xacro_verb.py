@@ -20,7 +20,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def test_a_file_is_expanded_to_standard_output(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["xacro", str(file)]) == 0
+    assert main(["xacro", "--inorder", str(file)]) == 0
     model = parse(capsys.readouterr().out, file)
     assert (model.name, model.root) == ("r", "base_link")
 

@@ -175,6 +175,13 @@ def test_a_bad_expression_is_reported_with_the_chain_of_macros_and_includes(fold
     )
 
 
+def test_a_macro_without_its_prefix_is_named(folder: Path) -> None:
+    for params, name in [('params="name"', "${name}"), ("", "left")]:
+        macro = f'<macro name="wheel" {params}>\n<link name="{name}"/></macro>'
+        message = failure(write(folder, f"{macro}\n<xacro:wheel/>"))
+        assert message.endswith("; <macro> lacks its prefix: write <xacro:macro ...> ... </xacro:macro>")
+
+
 def test_a_missing_include_under_a_guessed_package_names_the_guess(folder: Path) -> None:
     message = failure(write(folder, '<xacro:include filename="$(find other)/urdf/gone.xacro"/>'))
     assert f"No such file or directory: {folder.parent}/urdf/gone.xacro" in message

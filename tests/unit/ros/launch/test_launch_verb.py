@@ -219,6 +219,9 @@ def test_a_file_that_is_not_there_is_one_line(launch: Launch) -> None:
         (["b.launch.py"], 1, "b.launch.py does not exist, and there are no launch files in that folder"),
         (["my_bot", "b.launch.py"], 1, "no launch file 'b.launch.py' in "),
         (["my_boot", "a.launch.py"], 1, "no package 'my_boot' around "),
+        (["my_bot"], 1, "my_bot is a package; give one of its launch files too: none"),
+        (["gazebo_ros"], 1, "gazebo_ros is replaced here, and has no 'launch'"),
+        (["my_boot"], 1, "my_boot does not exist, and there are no launch files in that folder"),
         (["a", "b", "c"], 2, "give FILE, or PACKAGE FILE, not 'a b c'"),
         (["x:=1"], 2, "give FILE, or PACKAGE FILE, not 'nothing'"),
     ]:
