@@ -11,7 +11,8 @@ from holozen.messages.type_hash import type_hash
 
 @pytest.fixture
 def lesson(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A student's package, with the interface of the lesson."""
+    """A student's package, with the interface of the lesson. The folders of other tests are not searched."""
+    tmp_path.chmod(0o1777)
     for name, text in {
         "srv/NextGoal.srv": "int64 request_goal\n---\nfloat64 x_goal\nint64 end_of_list\n",
         "msg/Where.msg": "Header header\ngeometry_msgs/Pose2D at\nSpot[] spots\n",
