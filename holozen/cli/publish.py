@@ -71,7 +71,7 @@ def _run(
         if args.wait and matched < args.wait and not stop.is_set():
             raise Failure(f"{args.key}: {args.wait} subscribers did not come in time, so nothing is published")
     status_key = form.status_key
-    feedback = _feedback(bus, status_key, form.is_velocity) if status_key else None
+    feedback = command_feedback(bus, status_key, form.is_velocity) if status_key else None
     if feedback and matched and payload not in form.stops:
         bus.clock_asked.wait(CLOCK_PATIENCE)  # only a stop is obeyed before the robot knows our clock
     turns = _lines(form, args, stop) if args.stdin else _turns(form, payload, args, stop)
@@ -218,7 +218,9 @@ def _stop_robot(publisher: RawPublisher, stops: set[bytes]) -> None:
         time.sleep(STOP_EVERY)
 
 
-def _feedback(bus: Bus, key: str, is_velocity: bool) -> CommandFeedback:
+def command_feedback(bus: Bus, key: str, is_velocity: bool = True) -> CommandFeedback:
+    """Feedback about this node's commands from the command status on `key`."""
+
     def more(driver: str) -> str:
         from holozen import entities
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from holozen.bag import Message
     from holozen.bag.player import Outlet, Plan, Player
     from holozen.bag.reader import Summary
+    from holozen.command.feedback import CommandFeedback
 
 WAIT = ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "20000")  # microseconds
 AGAIN = 0.02  # s between two rounds of a loop, so that a very short bag does not flood the bus
@@ -30,6 +31,7 @@ def run(args: argparse.Namespace) -> int:
     """Play files, one after the other."""
     from holozen.bag.player import Outlet, Player, keys, plan
     from holozen.bag.reader import Bag, summarize
+    from holozen.cli.publish import command_feedback
 
     olds = [old for old, _ in args.remap]
     if twice := next((old for old in olds if olds.count(old) > 1), ""):
@@ -55,8 +57,9 @@ def run(args: argparse.Namespace) -> int:
         outlet.settle()
         with keys(stop) as pressed:
             player = Player(outlet.publish, outlet.stop, pressed, stop, args.rate, _report_gap, args.start_paused)
+            feedback = [command_feedback(bus, f"{target}_status") for target in _velocities(made)]
             stop.wait(args.delay)
-            return _play(args, summaries, player, outlet, set(made.targets))
+            return _play(args, summaries, player, outlet, set(made.targets), feedback)
 
 
 def _report_gap(seconds: float) -> None:
@@ -72,9 +75,27 @@ def _advice(made: "Plan") -> str:
     return "; --commands plays what moves robots" if made.left_out else ": the bag holds no messages"
 
 
+def _velocities(made: "Plan") -> list[str]:
+    """The keys on which commands of a velocity are played."""
+    from holozen.command.feedback import VELOCITIES
+
+    played = {target for channel, target in made.targets.items() if channel.type in VELOCITIES} if made.moves else set()
+    return sorted(played & made.commands)
+
+
 def _play(
-    args: argparse.Namespace, summaries: list["Summary"], player: "Player", outlet: "Outlet", wanted: set[object]
+    args: argparse.Namespace,
+    summaries: list["Summary"],
+    player: "Player",
+    outlet: "Outlet",
+    wanted: set[object],
+    feedback: list["CommandFeedback"],
 ) -> int:
+    def look(now: float) -> None:
+        line.update(now)
+        for each in feedback:
+            each.look()
+
     start = min((summary.start for summary in summaries if summary.count), default=0)
     first = start + round(args.start_offset * 1e9)
     last = start + round(args.until * 1e9) if args.until is not None else 2**64
@@ -83,7 +104,7 @@ def _play(
     try:
         while True:
             before = player.count
-            ended = player.play(_messages(args.files, wanted, first, last), line.update)
+            ended = player.play(_messages(args.files, wanted, first, last), look)
             if not (args.loop and ended and player.count > before):
                 break
             time.sleep(AGAIN)
@@ -99,7 +120,7 @@ def _play(
         print(printable(f"played {player.count} messages in {seconds:.1f} s"))
     if ended and not player.count:
         raise Failure("nothing was played" if outlet.left_out else "no message is between --start-offset and --until")
-    return 0
+    return int(any(each.refusal for each in feedback))
 
 
 def _messages(files: "list[Path]", wanted: set[object], first: int, last: int) -> Iterator["Message"]:

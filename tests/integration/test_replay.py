@@ -1,6 +1,7 @@
 """`holozen replay`: the same bytes on the same keys; robots are moved only if asked, and stopped at the end."""
 
 import json
+import re
 import signal
 import time
 from pathlib import Path
@@ -124,6 +125,15 @@ def test_commands_drive_the_robot_and_a_stop_ends_them(town: Wire, robot: Robot,
     assert {s.priority for s in sent} == {"DATA"}
     assert all(s.source.startswith("replay@") for s in sent)
     assert [s.payload for s in sent[8:]] == STOPS
+
+
+def test_commands_that_a_robot_does_not_obey_are_reported(town: Wire, robot: Robot, tmp_path: Path) -> None:
+    path = bag(tmp_path / "a.mcap", *commands(20), types=(Twist,))
+    assert town.run("stop").returncode == 0
+    done = town.run("replay", path, "--commands")
+    assert town.run("release").returncode == 0
+    assert done.returncode == 1
+    assert re.fullmatch(r"not obeyed: stop@\w+ has set the software stop\n", done.stderr)
 
 
 def test_a_robot_that_comes_while_it_plays_is_not_moved(wire: Wire, tmp_path: Path) -> None:

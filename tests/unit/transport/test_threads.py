@@ -89,7 +89,7 @@ for use in (lambda: Bus('child'), lambda: odom.put(Odometry()), lambda: bus.call
             kept.recv, kept.try_recv, lambda: bus.publisher('more', Odometry)):
     if os.fork() == 0:
         use()
-    print(os.waitstatus_to_exitcode(os.wait()[1]))
+    print(os.waitstatus_to_exitcode(os.wait()[1]), flush=True)
 """
     done = subprocess.run(
         [sys.executable, "-c", UNCLOSED + words, wire.endpoint], capture_output=True, text=True, timeout=60
