@@ -70,9 +70,8 @@ class CommandFeedback:
         report: Callable[[str], None] = report_line,
         more: Callable[[str], str] = lambda _driver: "",
     ) -> None:
-        self._source, self._latest, self._is_velocity, self._report, self._more = (
-            source, latest, is_velocity, report, more,
-        )  # fmt: skip
+        self._source, self._latest, self._is_velocity = source, latest, is_velocity
+        self._report, self._more = report, more
         self._resume = wire.resume_command(key.rpartition("/")[0])
         self._reported = self._driver = ""
         self._judged: Any = None  # the last status, and the one before

@@ -216,10 +216,10 @@ class Node:
         def refuse(*_words: Any, **_flags: Any) -> NoReturn:
             raise BusError(FORKED)
 
+        for one in self._declared:
+            one.leave_to_parent(refuse)
         _of_parents.append((self._opened, self._declared))
         self._opened, self._declared = refuse, set()
-        for one in _of_parents[-1][1]:
-            one.leave_to_parent(refuse)
 
     def close_session(self) -> None:
         """Close the session alone; what is declared is not withdrawn first."""
