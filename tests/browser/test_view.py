@@ -56,6 +56,12 @@ DECK = 0.295  # m; the height of hb_bot's orange deck
 NEAR = 14  # pixels between the middle of what is seen of the deck, and the robot's
 FARTHEST = 0.5 * 0.5 + 0.05  # m; what a robot at 0.5 m/s goes in the 0.5 s that a stop may take, and a little
 TWO_FRAMES = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+FEW_FRAMES = """
+    const frame = window.requestAnimationFrame.bind(window);
+    window.requestAnimationFrame = draw => setTimeout(() => frame(draw), 200);
+    window.cancelAnimationFrame = clearTimeout;
+"""
+"""Draws at most 5 frames a second: a software renderer would take both cores for as many as it can."""
 GONE = "Tried to update non-existent component"
 """Viser's page reports it where a person uses what is being removed, such as a held button."""
 PHONE = {"width": 390, "height": 844}
@@ -100,6 +106,7 @@ def opened(chromium: Browser, view: str, sim: Process) -> Iterator[Open]:
         own = address.partition("?")[0]
         own_socket = own.replace("http", "ws", 1)
         contexts.append(context := chromium.new_context(**{"viewport": SIZE, **options}))
+        context.add_init_script(FEW_FRAMES)
         page = context.new_page()
         page.on("console", lambda reported: faults.append(reported.text) if is_fault(reported) else None)
         page.on("pageerror", lambda error: faults.append(str(error)))
@@ -122,6 +129,20 @@ def first(opened: Open) -> Page:
     return opened()
 
 
+@pytest.fixture(scope="module")
+def link(view: str) -> Iterator[Proxy]:
+    """The network between the view and the phone."""
+    with Proxy(urlsplit(view).port or 0) as link:
+        yield link
+
+
+@pytest.fixture(scope="module")
+def phone(opened: Open, link: Proxy) -> Page:
+    """The page on another device."""
+    address = f"http://127.0.0.1:{link.port}/?token={TOKEN}"
+    return opened(address, viewport=PHONE, is_mobile=True, has_touch=True, device_scale_factor=COARSE)
+
+
 @pytest.fixture
 def page(first: Page) -> Iterator[Page]:
     """A page for all tests; each leaves it with no button held, also where it fails."""
@@ -133,6 +154,13 @@ def place(odom: Latest[Odometry]) -> tuple[float, float]:
     message = odom.read()[0]
     assert message is not None
     return message.pose.pose.position.x, message.pose.pose.position.y
+
+
+def put(bus: Bus, odom: Latest[Odometry], x: float, y: float) -> None:
+    """Place the robot there."""
+    request = SetEntityStateRequest("hb_bot", EntityState(pose=Pose(Point(x, y, -0.04))))
+    bus.call("set_entity_state", request, SetEntityStateReply)
+    wait_for(lambda: math.dist(place(odom), (x, y)) < 0.001, what=f"the robot at {x}, {y}")
 
 
 def speed(odom: Latest[Odometry]) -> float:
@@ -236,21 +264,6 @@ def test_another_window_in_front_ends_a_held_button(page: Page, odom: Latest[Odo
     page.mouse.up()
 
 
-def test_a_lost_network_stops_the_robot_and_a_button_that_was_held_does_not_go_on(
-    opened: Open, view: str, odom: Latest[Odometry]
-) -> None:
-    with Proxy(urlsplit(view).port or 0) as link:
-        page = opened(f"http://127.0.0.1:{link.port}/?token={TOKEN}", device_scale_factor=COARSE)
-        hold(page, "Backward", lambda: speed(odom) > 0.4)
-        link.stall()
-        stands_near(odom, place(odom))
-        link.resume()
-        page.get_by_text("not driven").wait_for()
-        seen = odom.count
-        assert odom.wait(seen + 25, 5) and speed(odom) < 0.01, "what was held back moves nothing"
-        page.close()
-
-
 def test_a_page_that_hung_stops_the_robot_and_does_not_go_on_by_itself(page: Page, odom: Latest[Odometry]) -> None:
     hold(page, "Turn left", lambda: turns(odom))
     page.evaluate("{const start = Date.now(); while (Date.now() - start < 800);}")  # as a phone that sleeps
@@ -270,9 +283,8 @@ def turns(odom: Latest[Odometry]) -> bool:
     return message is not None and abs(message.twist.twist.angular.z) > 0.05
 
 
-def test_a_thumb_drives_on_the_screen_of_a_phone(opened: Open, odom: Latest[Odometry]) -> None:
-    page = opened(viewport=PHONE, is_mobile=True, has_touch=True, device_scale_factor=COARSE)
-    button = page.get_by_role("button", name="Right", exact=True)
+def test_a_thumb_drives_on_the_screen_of_a_phone(phone: Page, odom: Latest[Odometry]) -> None:
+    button = phone.get_by_role("button", name="Right", exact=True)
 
     def within_reach() -> Any:  # without scrolling, once the panel has slid up
         box = button.bounding_box()
@@ -280,39 +292,49 @@ def test_a_thumb_drives_on_the_screen_of_a_phone(opened: Open, odom: Latest[Odom
 
     box = wait_for(within_reach, what="the pad")
     thumb = {"x": box["x"] + 30, "y": box["y"] + box["height"] / 2}
-    touch = page.context.new_cdp_session(page)
+    touch = phone.context.new_cdp_session(phone)
     touch.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [thumb]})
     wait_for(lambda: speed(odom) > 0.4, what="the robot to drive")
     touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
     stands_near(odom, place(odom))
-    page.close()
+
+
+def test_a_lost_network_stops_the_robot_and_a_button_that_was_held_does_not_go_on(
+    phone: Page, link: Proxy, odom: Latest[Odometry]
+) -> None:
+    hold(phone, "Backward", lambda: speed(odom) > 0.4)
+    link.stall()
+    stands_near(odom, place(odom))
+    link.resume()
+    phone.get_by_text("not driven").wait_for()
+    seen = odom.count
+    assert odom.wait(seen + 25, 5) and speed(odom) < 0.01, "what was held back moves nothing"
+    phone.mouse.up()
 
 
 def test_a_second_page_shows_the_driver_stops_it_drives_itself_and_stops_when_it_is_closed(
-    page: Page, opened: Open, odom: Latest[Odometry]
+    page: Page, phone: Page, odom: Latest[Odometry]
 ) -> None:
-    other = opened(device_scale_factor=COARSE)
-
     def refused() -> bool:
-        other.mouse.up()
+        phone.mouse.up()
         hold(page, "Forward", lambda: speed(odom) > 0.4)  # again if it was let go of, as on a busy machine
-        if not is_soon(other.get_by_text("driven by view@").is_visible):
+        if not is_soon(phone.get_by_text("driven by view@").is_visible):
             return False
-        press(other, "Backward")
-        shown = is_soon(other.get_by_text("another page drives this robot").is_visible)
+        press(phone, "Backward")
+        shown = is_soon(phone.get_by_text("another page drives this robot").is_visible)
         message = odom.read()[0]
         return bool(shown and message and message.twist.twist.linear.x > 0.4)
 
     wait_for(refused, 20, "the other page to be refused while the robot drives on")
-    other.mouse.up()
-    other.get_by_role("button", name="Stop", exact=True).click()
+    phone.mouse.up()
+    phone.get_by_role("button", name="Stop", exact=True).click()
     page.get_by_text("stopped by view@").first.wait_for()
     stands_near(odom, place(odom))
     page.mouse.up()
-    other.get_by_role("button", name="Release", exact=True).click()
+    phone.get_by_role("button", name="Release", exact=True).click()
     page.get_by_text("not driven").wait_for()
-    hold(other, "Backward", lambda: speed(odom) > 0.4)
-    other.close()
+    hold(phone, "Backward", lambda: speed(odom) > 0.4)
+    phone.close()
     stands_near(odom, place(odom))
 
 
@@ -332,7 +354,8 @@ def test_displays_show_what_topics_hold_in_the_frames_of_tf(page: Page, bus: Bus
     images = bus.publisher("eye", Image)
     for name in ("LaserScan: scan", "Image: eye"):
         page.get_by_text(name, exact=True).click()
-    x, y = place(odom)
+    x, y = 0.0, 0.0
+    put(bus, odom, x, y)
     message = odom.read()[0]
     assert message is not None
     turned = yaw(Transform.of(Point(), message.pose.pose.orientation).rotation)
@@ -367,7 +390,8 @@ def test_displays_show_what_topics_hold_in_the_frames_of_tf(page: Page, bus: Bus
 
 def test_a_path_stays_in_its_frame_while_the_robot_moves(page: Page, bus: Bus, odom: Latest[Odometry]) -> None:
     page.get_by_role("tab", name="Displays").click()
-    x, y = place(odom)
+    x, y = 0.0, 0.0
+    put(bus, odom, x, y)
     message = odom.read()[0]
     assert message is not None
     plan = bus.publisher("plan", PathMessage)
@@ -384,8 +408,7 @@ def test_a_path_stays_in_its_frame_while_the_robot_moves(page: Page, bus: Bus, o
 
     wait_for(published, 20, "the path")
     for way in (0.5, 0.0):
-        request = SetEntityStateRequest("hb_bot", EntityState(pose=Pose(Point(x, y + way, -0.04))))
-        bus.call("set_entity_state", request, SetEntityStateReply)
+        put(bus, odom, x, y + way)
         wait_for(lambda way=way: shows_it_at(page, x, y + way), what="the robot elsewhere")  # type: ignore[misc]
         wait_for(shown, what="the path where it was")
     page.get_by_text("Path: plan", exact=True).click()
@@ -401,8 +424,8 @@ def test_what_is_drawn_in_a_fixed_frame_goes_and_comes_with_that_frame_and_with_
     page.get_by_role("tab", name="Displays").click()
     choose(page, "Robot", "rover")
     gone = page.get_by_text("the frame hall is gone")
-    x, y = place(odom)
-    seen = (x, y - 0.8)  # beside the other robot
+    put(bus, odom, 0.0, 0.0)
+    seen = (0.0, -0.8)  # beside the other robot
 
     def scan(parent: str = "") -> Any:
         """Publish a wall, and where odometry began in `parent`. Returns the pixels of the wall."""
@@ -578,7 +601,7 @@ def test_it_is_grey_when_the_sim_is_killed_and_comes_back_with_it(page: Page, to
     wait_for(lambda: shows_it_at(page, 0.0, 0.0), what="an orange robot at the start")
 
 
-def test_the_camera_follows_and_looks_down(page: Page, bus: Bus) -> None:
+def test_the_camera_follows_and_looks_down(page: Page, bus: Bus, odom: Latest[Odometry]) -> None:
     middle = (SIZE["width"] / 2, SIZE["height"] / 2)
 
     def in_the_middle() -> bool:
@@ -588,8 +611,7 @@ def test_the_camera_follows_and_looks_down(page: Page, bus: Bus) -> None:
     page.get_by_role("tab", name="World").click()
     page.get_by_text("Follow").click()
     for x in (1.0, 3.0):
-        request = SetEntityStateRequest("hb_bot", EntityState(pose=Pose(Point(x, 2.0, -0.04))))
-        bus.call("set_entity_state", request, SetEntityStateReply)
+        put(bus, odom, x, 2.0)
         wait_for(in_the_middle, what=f"the robot at {x} in the middle")
     page.get_by_text("Follow").click()
     page.get_by_role("button", name="Top view").click()
