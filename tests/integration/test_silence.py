@@ -81,7 +81,8 @@ def test_a_teleop_that_wakes_up_after_its_key_timeout_does_not_drive_on(town: Wi
 def drives_fast(town: Wire, robot: Robot) -> Terminal:
     terminal = town.terminal("teleop", "--speed", "2", "--key-timeout", "0.4")
     terminal.wait_for_text("listening")
-    terminal.hold_until("i", lambda: moves(robot.newest(), 2, 0, 0))
+    # The test may get a link to the teleop later than the sim does.
+    terminal.hold_until("i", lambda: moves(robot.newest(), 2, 0, 0) and robot.commands.messages())
     return terminal
 
 
