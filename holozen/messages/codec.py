@@ -28,7 +28,7 @@ Makers = tuple[tuple[type[M], Callable[[Any], M]], ...]
 JSON = {"", "zenoh/bytes", "zenoh/string", "text/plain", "text/json", "application/json"}
 
 LONGEST = 200  # characters of a reason
-U = ord("u")
+N, U = ord("n"), ord("u")
 UNTYPED = (
     "CDR without its Encoding, so of no certain type; what a bridge to ROS 2 sends comes in by `holozen ros2 --bridge`"
 )
@@ -91,7 +91,7 @@ def writer(kind: type[M], wire: str, checks: bool) -> Callable[[M], tuple[bytes,
             return write(message)  # the long way has the reason
         # One byte is found ten times faster than four, and most messages have at most one of these, in "angular".
         before, _, after = payload.partition(b"u")
-        if (U not in after and before[-1:] != b"n") or not _has_null(payload):
+        if (U not in after and before[-1] != N) or not _has_null(payload):
             return payload, None
         return write(message)
 

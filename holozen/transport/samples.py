@@ -41,8 +41,8 @@ class Stamp(NamedTuple):
 
 def stamps(node: str, session: str, numbers: Iterator[int]) -> Callable[[], bytes]:
     """A function that makes attachments with sender and stamp: `node@session;number;nanoseconds`."""
-    start = f"{node}@{session};"
-    return lambda: f"{start}{next(numbers)};{time.monotonic_ns()}".encode()
+    start = f"{node}@{session};".encode()
+    return lambda: b"%b%d;%d" % (start, next(numbers), time.monotonic_ns())
 
 
 def source_in(attachment: Any) -> str:
