@@ -58,9 +58,10 @@ class Publisher(Owned):
                 raise InvalidHandle(f"the publisher of {self.topic} was destroyed") from None
             raise
         if self._feedback:
-            if not isinstance(msg, bytes):
-                self._feedback.strafes |= getattr(msg, "twist", msg).linear.y != 0
-            self._feedback.look()
+            if isinstance(msg, bytes):
+                self._feedback.look()
+            else:
+                self._feedback.sent(msg)
 
     def get_subscription_count(self) -> int:
         """How many subscriptions receive what is sent now; 1 if only programs that are not holozen nodes do."""
