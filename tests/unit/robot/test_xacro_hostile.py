@@ -92,6 +92,15 @@ def test_a_hostile_expression_has_no_way_out(home: Path, monkeypatch: pytest.Mon
                 server.accept()
 
 
+def test_a_reply_that_an_expression_wrote_is_an_error_in_a_line(home: Path) -> None:
+    is_open = f"{OS}['path'].exists('/proc/self/fd/' + str(each))"
+    write = f"[({OS}['ftruncate'](each, 0), {OS}['write'](each, b'5')) for each in range(3, 9) if {is_open}]"
+    robot = home / "robot.xacro"
+    robot.write_text(ROBOT % f"[{write}, {OS}['_exit'](0)]")
+    with pytest.raises(RobotError, match=r"robot\.xacro: xacro failed at the file: its reply is neither .*$"):
+        expand_xacro(robot)
+
+
 def test_what_an_expression_may_do_it_still_may(home: Path) -> None:
     package = home / "bot"
     (package / "urdf").mkdir(parents=True)
