@@ -15,7 +15,7 @@ from holozen import wire
 from holozen.suggest import cut, shorten
 from holozen.transport import services
 from holozen.transport.errors import BusError
-from holozen.transport.graph import Definition
+from holozen.transport.graph import definition
 from holozen.transport.node import Node, checked_wire
 from holozen.transport.peer_clocks import PeerClocks, clock_key
 from holozen.transport.pubsub import Gets, Latest, Publisher, RawPublisher, Subscription
@@ -191,7 +191,7 @@ class Bus(Node):
             return
         self._defined.add(interface.name)
         text = definitions.whole_text(interface)
-        self._keep(Definition(self.session, zenoh.handlers.RingChannel(16), interface.name, text))
+        self._keep(definition(self.session, zenoh.handlers.RingChannel(16), interface.name, text))
 
     def subscribe(
         self, key: str, *kinds: type[M], depth: int = 64, limit: int = 0, dealt: bool = False
