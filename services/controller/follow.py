@@ -299,7 +299,7 @@ class Follower:
             self._report_hold(reason)
         elif not fresh:
             self.halt()
-            self._report_hold(self._no_odom())
+            self._report_hold(f"waiting for {self._absence() or 'odom: it is stale, or none was received'}")
         elif odom is None or not all(abs(value) <= MAX_DISTANCE for value in odom.pose.pose.planar()):
             self.halt()
             self._report_hold(f"waiting for odom: its pose is more than {MAX_DISTANCE:g} m away")
@@ -313,10 +313,6 @@ class Follower:
                 self._report(ONLY_TURNS)
             return odom
         return None
-
-    def _no_odom(self) -> str:
-        """Why it waits for odom."""
-        return f"waiting for {self._absence() or 'odom: it is stale, or none was received'}"
 
     def _absence(self) -> str:
         """That the robot is not there, with the present ones, if no odom came in NOTICE seconds since the start; else
