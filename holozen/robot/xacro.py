@@ -243,23 +243,15 @@ def _ask(file: XacroFile, outside: Mapping[str, bool]) -> tuple[int, bytes]:
     with os.fdopen(os.memfd_create("reply"), "rb") as reply:
         try:
             # A session of its own: only this process gets Ctrl-C, and it always ends the child.
-            child = subprocess.Popen(
-                words, stdin=subprocess.PIPE, stdout=reply, stderr=reply, env=env, start_new_session=True
-            )
+            code = subprocess.run(
+                words, input=question, stdout=reply, stderr=reply, env=env, start_new_session=True, timeout=PATIENCE
+            ).returncode
+        except subprocess.TimeoutExpired:
+            code = -signal.SIGKILL
         except OSError as error:
             raise RobotError(f"cannot start {sys.executable} to expand xacro: {error.strerror}") from None
-        try:
-            child.communicate(question, PATIENCE)
-        except subprocess.TimeoutExpired:
-            pass  # it is killed
-        finally:
-            child.kill()
-            child.wait()
-            with contextlib.suppress(OSError):
-                if child.stdin:
-                    child.stdin.close()
         reply.seek(0)
-        return child.returncode, reply.read()
+        return code, reply.read()
 
 
 def _ended(path: Path, code: int, found: bytes) -> str:
