@@ -12,7 +12,7 @@ import stat
 import subprocess
 import sys
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from xml.parsers.expat import ExpatError, ParserCreate
@@ -203,7 +203,7 @@ def expand_in_child(file: XacroFile) -> Outcome:
     whether it is one.
     """
     outside: dict[str, bool] = {}
-    while len(outside) <= MAX_OUTSIDE:
+    for _ in range(MAX_OUTSIDE + 1):
         code, reply = _ask(file, outside)
         if code:
             return Outcome(error=_ended(file.path, code, reply))
@@ -238,7 +238,8 @@ def _ask(file: XacroFile, outside: Mapping[str, bool]) -> tuple[int, bytes]:
     passed_on = ("LD_LIBRARY_PATH", *VARIABLES, *file.allow_env)
     env = {name: os.environ[name] for name in passed_on if name in os.environ}
     words = [sys.executable, "-I", "-S", "-X", "utf8", "-c", BOOT]
-    question = pickle.dumps([*map(str, sys.path), _ROOT]) + pickle.dumps((file, outside, [*os.environ]))
+    plain = replace(file, args=dict(file.args), packages=dict(file.packages), allow_env=[*file.allow_env])
+    question = pickle.dumps([*map(str, sys.path), _ROOT]) + pickle.dumps((plain, outside, [*os.environ]))
     # In memory: its size has a limit, which a pipe would not have, and there may be no writable folder.
     with os.fdopen(os.memfd_create("reply"), "rb") as reply:
         try:

@@ -231,12 +231,7 @@ class PlanarBody(Body):
             if (steps := _within(apart - SKIN, way)) >= LOOK:
                 return steps
             other.locate()
-        return _within(self._gap(number), way)
-
-    def _gap(self, number: int) -> float:
-        """The distance (m) to where the engine has another body, less SKIN."""
-        within = self._field.margin(self.speed)
-        return self._engine.gap(self.number, number, within) - SKIN
+        return _within(self._engine.gap(self.number, number, field.margin(self.speed)) - SKIN, way)
 
     def locate(self) -> XYZ:
         """Move the engine's body, which stays at the place of the last look while this one glides, to its true place.
