@@ -205,7 +205,7 @@ def key_for(key: str, robot: str = "") -> str:
     return f"{robot}/{key}" if robot and not key.startswith(f"{robot}/") else key
 
 
-def resume_command(robot: str = "") -> str:
+def resume_command(robot: str) -> str:
     """The command that lets every source drive a robot again."""
     return f"holozen controller {robot and f'{robot} '}--resume"
 

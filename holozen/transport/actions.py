@@ -322,7 +322,7 @@ def _answered_later(_request: Any) -> Any:
 
 
 def wait_for_result(
-    node: Node, action: str, payload: bytes, encoding: str, closed: Callable[[], bool] = lambda: False
+    node: Node, action: str, payload: bytes, encoding: str, closed: Callable[[], bool]
 ) -> Sample | None:
     """Ask for the result of a goal, and wait until the goal has ended; None if `closed` became true before.
 

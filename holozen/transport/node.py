@@ -232,7 +232,7 @@ class Node:
         self._declared.add(declared)
         return declared
 
-    def announce(self, kind: str = "node", type_name: str = "", key: str = "") -> Any:
+    def announce(self, kind: str, type_name: str = "", key: str = "") -> Any:
         """List a node or an endpoint in the graph for as long as the token is kept. Raises BusError."""
         endpoint = graphs.Endpoint(key, kind, type_name, self.node, self.id)
         with one_line(f"key {key!r}"):

@@ -43,8 +43,7 @@ class Robot:
 
     def __init__(
         self, bus: Bus, name: str, prefix: str, model: RobotModel, mover: Mover, limits: tuple[float, float],
-        senders: Senders, phase: float = 0.0, time: CommandTime | None = None,
-        keep_stop: Callable[[], str] = lambda: "",
+        senders: Senders, phase: float, time: CommandTime, keep_stop: Callable[[], str],
     ) -> None:  # fmt: skip
         self._model, self.prefix = model, prefix
         self._agenda: Agenda[Robot] = Agenda()  # unused, until `schedule_on`

@@ -224,7 +224,7 @@ def _cell(velocity: Planar | None, axis: int, most: float, cells: int, style: st
     ]
 
 
-def bar(part: float, cells: int, style: str, ascii: bool = False) -> Line:
+def bar(part: float, cells: int, style: str, ascii: bool) -> Line:
     """A bar for a `part` from -1 to 1, in an odd number of cells: from the middle to the right, or to the left if it is
     negative.
     """
