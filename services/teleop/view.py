@@ -211,7 +211,7 @@ def _scale(state: State, axis: int) -> float:
     return max([setting, *(size for size in sizes if math.isfinite(size))])
 
 
-def _cell(velocity: Planar | None, axis: int, most: float, cells: int, style: str, ascii: bool) -> Line:
+def _cell(velocity: Planar | None, axis: int, most: float, cells: int, style: str, ascii: bool = False) -> Line:
     if velocity is None:
         return [*bar(0.0, cells, style, ascii), ("dim", "-".rjust(NUMBER))]
     value = velocity[axis]
@@ -224,7 +224,7 @@ def _cell(velocity: Planar | None, axis: int, most: float, cells: int, style: st
     ]
 
 
-def bar(part: float, cells: int, style: str, ascii: bool) -> Line:
+def bar(part: float, cells: int, style: str, ascii: bool = False) -> Line:
     """A bar for a `part` from -1 to 1, in an odd number of cells: from the middle to the right, or to the left if it is
     negative.
     """
