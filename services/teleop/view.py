@@ -211,7 +211,7 @@ def _scale(state: State, axis: int) -> float:
     return max([setting, *(size for size in sizes if math.isfinite(size))])
 
 
-def _cell(velocity: Planar | None, axis: int, most: float, cells: int, style: str, ascii: bool = False) -> Line:
+def _cell(velocity: Planar | None, axis: int, most: float, cells: int, style: str, ascii: bool) -> Line:
     if velocity is None:
         return [*bar(0.0, cells, style, ascii), ("dim", "-".rjust(NUMBER))]
     value = velocity[axis]
