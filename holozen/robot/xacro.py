@@ -185,6 +185,7 @@ def _evict(folder: Path) -> None:
 PROCESSOR_TIME = 6  # s for a whole expansion; the largest robots take 2
 STEP_TIME = 1.2  # s of CPU time for one expression or element, after which the kernel ends the process
 PATIENCE = 60.0  # s; the child's own CPU time limits end it long before, unless it sleeps
+MAX_NOTE = 10_000  # bytes that are read of a child that failed
 MAX_OUTSIDE = 20  # robot files that are included from outside all known folders
 _ROOT = str(Path(__file__).resolve().parents[2])
 # Without `site`, whose search path is passed in instead, startup takes half as long.
@@ -252,7 +253,7 @@ def _ask(file: XacroFile, outside: Mapping[str, bool]) -> tuple[int, bytes]:
         except OSError as error:
             raise RobotError(f"cannot start {sys.executable} to expand xacro: {error.strerror}") from None
         reply.seek(0)
-        return code, reply.read()
+        return code, reply.read(MAX_NOTE if code else -1)
 
 
 def _ended(path: Path, code: int, found: bytes) -> str:
