@@ -19,7 +19,7 @@ from holozen.bus import Bus
 from holozen.cli import values
 from holozen.cli.hints import suggest_key
 from holozen.cli.output import decode
-from holozen.command.feedback import VELOCITIES, CommandFeedback
+from holozen.command.feedback import CommandFeedback
 from holozen.console import Failure, report
 from holozen.limits import not_finite
 from holozen.messages import WIRES, CodecError, encoding_of
@@ -274,7 +274,7 @@ class Form:
     @property
     def is_velocity(self) -> bool:
         """Whether it commands a velocity."""
-        return self._is_command and self.kind.name in VELOCITIES
+        return self._is_command and self.kind.name in wire.VELOCITIES
 
     @property
     def status_key(self) -> str:

@@ -12,7 +12,6 @@ from holozen.console import report as report_line
 FRESH = 1.0  # s; after that a robot whose status came is gone
 COVERED = 3  # statuses after a command, of which the last was sent after the command has been read
 HOLDING = 0.3  # s within which a status tells who is held after a stop; it comes at 10 Hz
-VELOCITIES = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
 LIMITED = "over the limits"  # prefix of the sim's reason when it drives slower than commanded
 OVERRULED = "overruled"  # prefix of its reason when a higher source drives
 DRIVES = " drives"

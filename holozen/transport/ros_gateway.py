@@ -389,7 +389,7 @@ class Gateway:
 
     def _stops(self, type_name: str, payload: bytes) -> bool:
         """Whether a command is a velocity of zero, which is forwarded at any age."""
-        if type_name not in ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"):
+        if type_name not in wire.VELOCITIES:
             return False
         try:
             value = cdr.read(self._registry.find(type_name), payload)

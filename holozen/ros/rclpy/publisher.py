@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from holozen.command.feedback import VELOCITIES, CommandFeedback
+from holozen.command.feedback import CommandFeedback
 from holozen.messages import CommandStatus
 from holozen.messages.codec import decoder
 from holozen.ros.rclpy.callback_groups import CallbackGroup
@@ -13,7 +13,7 @@ from holozen.ros.rclpy.qos import HistoryPolicy, QoSProfile
 from holozen.transport.bus import LARGEST_STATE
 from holozen.transport.graph import subscribers
 from holozen.transport.pubsub import Latest, Subscription
-from holozen.wire import is_command
+from holozen.wire import VELOCITIES, is_command
 
 __all__ = ["Publisher"]
 
