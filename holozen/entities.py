@@ -57,7 +57,7 @@ def names(bus: Bus, notice: float = 0.0) -> list[str]:
     return sorted({name for names in names_by_sim(bus, notice) for name in names})
 
 
-def names_by_sim(bus: Bus, notice: float = 0.0) -> list[list[str]]:
+def names_by_sim(bus: Bus, notice: float) -> list[list[str]]:
     """For each sim the names of its entities. Raises ServiceError, also if none answers within `notice` s (0: 3 s)."""
     replies = ask_sims(bus, "get_entities", si.GetEntitiesRequest(), si.GetEntitiesReply, notice)
     return [reply.entities for reply in replies]

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from holozen.limits import Planar
+from holozen.rotation import XYZ
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +48,12 @@ def to_body(vx: float, vy: float, yaw: float) -> tuple[float, float]:
     """A world-frame velocity (m/s) in the frame of a body at `yaw`."""
     cosine, sine = math.cos(yaw), math.sin(yaw)
     return vx * cosine + vy * sine, vy * cosine - vx * sine
+
+
+def velocity_at(away: XYZ, linear: XYZ, angular: XYZ) -> XYZ:
+    """The velocity of a point at an offset (m) from one that moves and turns: v + w x r."""
+    (x, y, z), (vx, vy, vz), (wx, wy, wz) = away, linear, angular
+    return vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x
 
 
 def wheel_rate(velocity: Planar, wheel: Wheel) -> float:

@@ -22,6 +22,9 @@ MAX_SPEED, MAX_TURN = 100.0, 1000.0  # m/s, rad/s; a command beyond them is a mi
 MAX_FORCE = 1e4  # N, N m; likewise
 MAX_OF_JOINT = {"position": 1e4, "velocity": 1e3, "effort": 1e6}  # rad or m; rad/s or m/s; N m or N; likewise
 
+VELOCITIES = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
+"""The types of commands of a velocity."""
+
 PRIORITY_OF = {"teleop": "INTERACTIVE_HIGH", "view": "INTERACTIVE_HIGH", "controller": "DATA_LOW"}
 """Zenoh priority of each command source. Others have DATA, as a plain `zenoh put`."""
 
@@ -84,7 +87,7 @@ class Action(NamedTuple):
 
 
 TOPICS = (
-    Topic("cmd_vel", ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"), ("teleop", "view", "controller"),
+    Topic("cmd_vel", VELOCITIES, ("teleop", "view", "controller"),
           ("sim",), 20.0, COMMAND_SILENCE, "0.5 s without a fresh one: the robot stops"),
     Topic("odom", ("nav_msgs/msg/Odometry",), ("sim",), ("teleop", "view", "controller", "pose_service"), 50.0,
           ODOM_SILENCE, "0.2 s: shown as stale, the controller stops"),
@@ -205,7 +208,7 @@ def key_for(key: str, robot: str = "") -> str:
     return f"{robot}/{key}" if robot and not key.startswith(f"{robot}/") else key
 
 
-def resume_command(robot: str = "") -> str:
+def resume_command(robot: str) -> str:
     """The command that lets every source drive a robot again."""
     return f"holozen controller {robot and f'{robot} '}--resume"
 

@@ -256,7 +256,7 @@ def _add_status(publishers: list[Row], status: Row) -> None:
     for source in sources if isinstance(sources, list) else ():  # the status is not validated yet
         if isinstance(source, dict) and all(isinstance(source.get(name), kind) for name, kind in SOURCE.items()):
             row = _row_of(publishers, source["source"])
-            row |= {name: source[name] for name in ("priority", "rate", "obeyed", "held")}
+            row |= {name: source[name] for name in SOURCE}
 
 
 def _listen(bus: Node, name: str) -> dict[str, Sample]:
@@ -300,7 +300,7 @@ def _line(row: Row) -> str:
     """One publisher or subscriber: `teleop (ab12cd)  INTERACTIVE_HIGH  20.0 Hz  obeyed`."""
     session = row["session"]
     words = [f"{row['node']} ({session[:6]})" if session else str(row["node"])]
-    words += [row[name] for name in ("priority",) if name in row]
+    words += [row["priority"]] if "priority" in row else []
     words += [f"{row['rate']:.1f} Hz"] if "rate" in row else []
     words += [name for name in ("obeyed", "held") if row.get(name)]
     words += [row["encoding"]] if "encoding" in row else []

@@ -195,11 +195,13 @@ def describe(args: argparse.Namespace, nodes: Nodes, node: str) -> int:
 def dump(args: argparse.Namespace, nodes: Nodes, node: str) -> int:
     """Print all values of a node."""
     names = nodes.names(node)
-    values = nodes.values(node, names)
-    if not args.json:
-        print("\n".join(file_lines(node, {name: value.plain() for name, value in zip(names, values, strict=True)})))
-    for name, value in zip(names, values, strict=True) if args.json else ():
-        print(json.dumps(_row(node, name, value)))
+    values = dict(zip(names, nodes.values(node, names), strict=True))
+    if args.json:
+        lines = [json.dumps(_row(node, name, value)) for name, value in values.items()]
+    else:
+        lines = file_lines(node, {name: value.plain() for name, value in values.items()})
+    for line in lines:
+        print(line)
     return 0
 
 

@@ -19,7 +19,7 @@ from holozen.bus import Bus
 from holozen.cli import values
 from holozen.cli.hints import suggest_key
 from holozen.cli.output import decode
-from holozen.command.feedback import VELOCITIES, CommandFeedback
+from holozen.command.feedback import CommandFeedback
 from holozen.console import Failure, report
 from holozen.limits import not_finite
 from holozen.messages import WIRES, CodecError, encoding_of
@@ -81,8 +81,7 @@ def _run(
             publisher.put_bytes(each)
             sent += 1
             if feedback:
-                feedback.strafes = form.strafes
-                feedback.look()
+                feedback.sent(form.command)
         if feedback and (args.once or args.times) and matched:
             feedback.wait(stop, VERDICT[bool(on_key(looking(), status_key, "pub"))])
     finally:
@@ -264,8 +263,8 @@ class Form:
         self._key, self._is_command = args.key, ours and wire.is_command(args.key, type_names)
         self.stops: set[bytes] = set()
         """The bytes that stop what its payloads move."""
-        self.strafes = False
-        """Whether a payload commands a velocity with a sideways part."""
+        self.command: Any = None
+        """The last payload as an object, if it is a command."""
 
     @property
     def encoding(self) -> str:
@@ -275,7 +274,7 @@ class Form:
     @property
     def is_velocity(self) -> bool:
         """Whether it commands a velocity."""
-        return self._is_command and self.kind.name in VELOCITIES
+        return self._is_command and self.kind.name in wire.VELOCITIES
 
     @property
     def status_key(self) -> str:
@@ -292,13 +291,11 @@ class Form:
         if bad and not self._force:
             raise ValueError(f"{bad} is not a finite number{FORCE}")
         if self._is_command:
-            command = _object(value)
+            command = self.command = _object(value)
             if not self._force and (bad := wire.implausible(command, self.kind.name)):
                 raise ValueError(f"{bad}{FORCE}")
             if (fields := wire.stop(command, self.kind.name)) is not None:
                 self.stops.add(written(self.kind, completed(self.kind, fields), self._wire))
-            if self.is_velocity:
-                self.strafes |= getattr(command, "twist", command).linear.y != 0
         return written(self.kind, value, self._wire)
 
     def _message(self, value: Any) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from holozen.console import Failure, Line, printable, report
 from holozen.flags import Instead, key, number, path, refused
 from holozen.process import stop_event
 from holozen.transport import connection
+from holozen.wire import VELOCITIES
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -77,8 +78,6 @@ def _advice(made: "Plan") -> str:
 
 def _velocities(made: "Plan") -> list[str]:
     """The keys on which commands of a velocity are played."""
-    from holozen.command.feedback import VELOCITIES
-
     played = {target for channel, target in made.targets.items() if channel.type in VELOCITIES} if made.moves else set()
     return sorted(played & made.commands)
 

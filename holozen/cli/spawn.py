@@ -5,10 +5,10 @@ import json
 import math
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from holozen import flags
 from holozen.bus import Bus
@@ -31,8 +31,7 @@ ENDS = {"</robot>": "<gazebo>{}</gazebo></robot>", "</model>": "{}</model>"}
 """The end tag of a robot in URDF and in SDF -> its replacement, with the plugin of a drive for {}."""
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
+class Place(NamedTuple):
     """The pose to spawn at: metres, and radians about the world's x, y, z. None: that of the file; for z the height at
     which it stands on the ground, unless the file gives one.
     """
@@ -276,10 +275,9 @@ def _requested_pose(model: "RobotModel", place: Place) -> "Pose":
     from holozen.robot.rigid import lowest
     from holozen.rotation import from_rpy
 
-    own = Place(*model.pose.xyz, *model.pose.rpy)
-    given = {part.name: getattr(place, part.name) for part in fields(Place)}
-    x, y, z, roll, pitch, yaw = (getattr(own, name) if value is None else value for name, value in given.items())
-    if place.z is None and own.z == 0:
+    own = (*model.pose.xyz, *model.pose.rpy)
+    x, y, z, roll, pitch, yaw = (mine if given is None else given for given, mine in zip(place, own, strict=True))
+    if place.z is None and z == 0:
         z = -lowest(model, (roll, pitch, yaw))
     return Pose.of((x, y, z), from_rpy(roll, pitch, yaw))
 

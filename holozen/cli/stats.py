@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
 import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -21,8 +20,7 @@ from holozen.cli.verb import Verb, by_name, open_bus
 from holozen.console import Failure, printable, report
 from holozen.flags import count, key, number
 from holozen.process import stop_event
-from holozen.transport.errors import BusError
-from holozen.transport.samples import RawSubscriber, Sample
+from holozen.transport.samples import RawSubscriber, Sample, until_closed
 
 Report = dict[str, Any]
 Measure = Callable[[Sample, float], float | None]
@@ -83,13 +81,6 @@ class Window:
         return lost(list(self._numbers)) if self._numbers else None
 
 
-def _received(subscriber: RawSubscriber) -> Iterator[Sample]:
-    """The samples of a key as they arrive, until the bus is closed."""
-    with contextlib.suppress(BusError):
-        while True:
-            yield subscriber.recv()
-
-
 class Watch:
     """Listens to the keys of a verb. `measure` returns the value of a sample, None if it has none; `excuse` returns why
     samples had none, empty if all had one.
@@ -138,7 +129,7 @@ class Watch:
             report(self._excuse() or f"no new messages on {keys}{near}")
 
     def _listen(self, subscriber: RawSubscriber) -> None:
-        for sample in _received(subscriber):
+        for sample in until_closed(subscriber.recv):
             now = time.monotonic()
             value = self._measure(sample, now)
             if value is None:
@@ -294,7 +285,7 @@ class Delays:
         return text if self.clockless else ""
 
     def _follow(self, subscriber: RawSubscriber) -> None:
-        for sample in _received(subscriber):
+        for sample in until_closed(subscriber.recv):
             value = self._reader.read(sample, self._bus)
             clock = value.get("clock") if isinstance(value, dict) else None
             if (seconds := _seconds(clock)) is not None:

@@ -33,11 +33,10 @@ NOTICE = 2.0  # s to discover the first robot, and those named on the command li
 
 def run(args: argparse.Namespace) -> int:
     """Stop or release robots; 0 only if all of them confirmed."""
-    verb, began = args.verb, time.monotonic()
-    where = connection.from_arguments(args)
+    began, where = time.monotonic(), connection.from_arguments(args)
     try:
-        with Bus(verb, where, patience=args.timeout) as bus:
-            orders = Orders(bus, verb, args, began)
+        with Bus(args.verb, where, patience=args.timeout) as bus:
+            orders = Orders(bus, args, began)
             orders.give()
             connected = bus.connected()
             code = orders.report()
@@ -117,12 +116,12 @@ def _read(payload: bytes, encoding: str) -> tuple[bool, str]:
 class Orders:
     """The requests to all robots, or to those that `args` name."""
 
-    def __init__(self, bus: Bus, verb: str, args: argparse.Namespace, began: float) -> None:
-        self._bus, self._verb, self._args, self._began = bus, verb, args, began
-        self._graph = bus.graph(TOKENS.format(verb=verb))
+    def __init__(self, bus: Bus, args: argparse.Namespace, began: float) -> None:
+        self._bus, self._verb, self._args, self._began = bus, args.verb, args, began
+        self._graph = bus.graph(TOKENS.format(verb=args.verb))
         self._wanted = {name.strip("/") for name in args.robots}
         # Those that are named, or else the robot at the root, are asked before they are discovered.
-        self._orders = {name: Order(name, verb, began) for name in filter(_can_be_asked, self._wanted or {""})}
+        self._orders = {name: Order(name, args.verb, began) for name in filter(_can_be_asked, self._wanted or {""})}
         self.found: set[str] = set()  # names of robots
         self._status: Latest[CommandStatus] | None = None  # of the robot at the root
         self._root = ""  # the name of the robot at the root, once it is known

@@ -1,10 +1,8 @@
 """Whether a robot follows the commands of a source, and why not, by its `cmd_vel_status`."""
 
-import math
 import threading
 import time
 from collections.abc import Callable
-from types import SimpleNamespace
 from typing import Any
 
 from holozen import wire
@@ -14,7 +12,6 @@ from holozen.console import report as report_line
 FRESH = 1.0  # s; after that a robot whose status came is gone
 COVERED = 3  # statuses after a command, of which the last was sent after the command has been read
 HOLDING = 0.3  # s within which a status tells who is held after a stop; it comes at 10 Hz
-VELOCITIES = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
 LIMITED = "over the limits"  # prefix of the sim's reason when it drives slower than commanded
 OVERRULED = "overruled"  # prefix of its reason when a higher source drives
 DRIVES = " drives"
@@ -46,10 +43,10 @@ def verdict(status: Any, source: str) -> str | None:
 
 def verdict_on_part(status: Any, before: Any, source: str) -> str | None:
     """As `verdict`, of commands to joints or forces, whose sources a status names only where they drive or are refused.
-    `before` is the status before it: a command that is accepted after a refusal is known by the counts.
+    `before` is the status before it, if any: a command that is accepted after a refusal is known by the counts.
     """
     why = verdict(status, source)
-    if not why or status.stopped or status.refused != before.refused:
+    if not why or status.stopped or before is None or status.refused != before.refused:
         return why
     return "" if status.accepted > before.accepted and not status.obeyed and not status.sources else None
 
@@ -74,15 +71,19 @@ class CommandFeedback:
         self._report, self._more = report, more
         self._resume = wire.resume_command(key.rpartition("/")[0])
         self._reported = self._driver = ""
-        self._judged: Any = None  # the last status, and the one before
-        self._before: Any = None
-        self._has_noted = False
-        self.strafes = False
-        """Whether the commands have a sideways part, which not every drive can make."""
+        self._judged: Any = None  # the last status that was judged
+        self._why: str | None = None  # its verdict
+        self._strafes = self._has_noted = False  # sideways commands were sent; that the drive makes none is reported
         self.refusal = ""
         """Why the robot does not obey, by the latest look; empty if it does, or is not known to."""
         self.stands = False
         """Whether it is certain that no source drives the robot, by the latest look."""
+
+    def sent(self, command: Any) -> None:
+        """Report any change after a command was sent. `command` is any object with its fields."""
+        if self._is_velocity and getattr(command, "twist", command).linear.y != 0:
+            self._strafes = True
+        self.look()
 
     def look(self) -> bool:
         """Report any change; returns whether the sim has judged the commands yet."""
@@ -98,7 +99,7 @@ class CommandFeedback:
                 self._report(f"not obeyed: {why}{resume}{self._more(self._driver)}")
             else:
                 self._report(why or "obeyed again")
-        if self.strafes and status.obeyed == self._source and not (status.strafes or self._has_noted):
+        if self._strafes and status.obeyed == self._source and not (status.strafes or self._has_noted):
             self._report(ONLY_TURNS)
             self._has_noted = True
         self._reported, self.refusal = why, "" if why.startswith(LIMITED) else why
@@ -126,8 +127,10 @@ class CommandFeedback:
             self._latest.wait(self._latest.count, left)
 
     def _verdict(self, status: Any) -> str | None:
-        if self._is_velocity:
-            return verdict(status, self._source)
         if status is not self._judged:
-            self._before, self._judged = self._judged or SimpleNamespace(refused=None, accepted=math.inf), status
-        return verdict_on_part(status, self._before, self._source)
+            before, self._judged = self._judged, status
+            if self._is_velocity:
+                self._why = verdict(status, self._source)
+            else:
+                self._why = verdict_on_part(status, before, self._source)
+        return self._why

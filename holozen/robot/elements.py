@@ -357,7 +357,7 @@ _CASES = (
 )  # fmt: skip
 
 
-def broken_xml(error: expat.ExpatError, text: str, context: str = "") -> str:
+def broken_xml(error: expat.ExpatError, text: str, context: str) -> str:
     """Why a text is not well-formed XML and, after the last semicolon, how to correct it: judged by the error, or by
     the reported line and the one before it. `context` is inserted between the two.
     """

@@ -56,7 +56,7 @@ def local_packages(start: Path) -> dict[str, Path]:
     return packages_in(folders_above(start))
 
 
-def known_folders(start: Path, given: Mapping[str, Path] = {}) -> list[Path]:
+def known_folders(start: Path, given: Mapping[str, Path]) -> list[Path]:
     """The folders of the packages that a robot file `start` may use data from: those given, those named by the
     environment, and those around the file, except any that contains the user's home.
     """
@@ -316,7 +316,7 @@ def folder_of(start: Path) -> Path:
     return Path(os.path.abspath(start if os.path.isdir(start) else start.parent))
 
 
-def find_by_name(lost: str, start: Path, given: Mapping[str, Path] = {}) -> list[Path]:
+def find_by_name(lost: str, start: Path, given: Mapping[str, Path]) -> list[Path]:
     """The files with the name of `lost`, a path on another machine, in the packages given, in those around the robot
     file `start`, and in its folder; sorted by how many trailing parts of the path they share, most first.
     """
@@ -336,7 +336,7 @@ def instead_of(lost: str, matches: list[Path], how: str, write: str) -> str:
     return f"there is no file {cut(lost, 200)}; {found}, which has the same name, is {how}; write {write}{also}"
 
 
-def portable_name(file: Path, start: Path, given: Mapping[str, Path] = {}, package: str = "$(find {})") -> str:
+def portable_name(file: Path, start: Path, given: Mapping[str, Path], package: str = "$(find {})") -> str:
     """A portable replacement for a file's absolute path: `$(find NAME)/...`, or a path relative to `start`.
 
     `package` is the form of a reference to a package, with {} for its name.

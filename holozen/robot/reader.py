@@ -108,11 +108,13 @@ def run(
             except (msgspec.MsgspecError, TypeError, ValueError):
                 raise RobotError(f"{what}: its reader was compromised, or has a bug: the reply is no {kind}") from None
         name, *rest = reply.asked
+        question = msgspec.msgpack.encode(reply.asked)
         if len(answers) >= MAX_ASKED:
             raise RobotError(f"{what}: refers to more than {MAX_ASKED} files outside of its folder and known packages")
-        if name not in handlers:
-            raise RobotError(f"{what}: its reader was compromised: it asked for {name!r}")
-        answers[msgspec.msgpack.encode(reply.asked)] = handlers[name](*rest)
+        if name not in handlers or question in answers:
+            again = " again" * (question in answers)
+            raise RobotError(f"{what}: its reader was compromised: it asked for {name!r}{again}")
+        answers[question] = handlers[name](*rest)
 
 
 def ask(name: str, *rest: Any) -> Any:

@@ -5,16 +5,19 @@ import glob
 import hashlib
 import json
 import os
+import pickle
 import re
 import signal
 import stat
 import subprocess
 import sys
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 from xml.parsers.expat import ExpatError, ParserCreate
+
+import msgspec
 
 from holozen.console import report
 from holozen.robot import reader
@@ -181,20 +184,17 @@ def _evict(folder: Path) -> None:
 
 PROCESSOR_TIME = 6  # s for a whole expansion; the largest robots take 2
 STEP_TIME = 1.2  # s of CPU time for one expression or element, after which the kernel ends the process
-MAX_WORDS = 100_000  # bytes of standard error
 PATIENCE = 60.0  # s; the child's own CPU time limits end it long before, unless it sleeps
+MAX_NOTE = 10_000  # bytes that are read of a child that failed
+MAX_OUTSIDE = 20  # robot files that are included from outside all known folders
 _ROOT = str(Path(__file__).resolve().parents[2])
 # Without `site`, whose search path is passed in instead, startup takes half as long.
 BOOT = """
-import json, sys
-asked = json.load(sys.stdin)
-sys.path[:] = asked["modules"]
+import pickle, sys
+sys.path[:] = pickle.load(sys.stdin.buffer)
 from holozen.robot.xacro_child import main
-main(asked)
+main()
 """
-
-
-MAX_OUTSIDE = 20  # robot files that are included from outside all known folders
 
 
 def expand_in_child(file: XacroFile) -> Outcome:
@@ -204,12 +204,19 @@ def expand_in_child(file: XacroFile) -> Outcome:
     whether it is one.
     """
     outside: dict[str, bool] = {}
-    while isinstance(outcome := _expand_once(file, outside), str):
-        if len(outside) == MAX_OUTSIDE:
-            problem = f"more than {MAX_OUTSIDE} files are included from outside of all known packages"
-            return Outcome(error=f"{file.path}: {problem}; give the package that holds them: --package NAME=DIR")
-        outside[outcome] = is_robot_file(outcome)
-    return outcome
+    for _ in range(MAX_OUTSIDE + 1):
+        code, reply = _ask(file, outside)
+        if code:
+            return Outcome(error=_ended(file.path, code, reply))
+        try:
+            answer: str | Outcome = msgspec.convert(json.loads(reply), str | Outcome)
+        except (ValueError, RecursionError):  # an expression wrote it
+            return Outcome(error=f"{file.path}: xacro failed at the file: its reply is neither a text nor an error")
+        if isinstance(answer, Outcome):
+            return answer
+        outside[answer] = is_robot_file(answer)
+    problem = f"more than {MAX_OUTSIDE} files are included from outside of all known packages"
+    return Outcome(error=f"{file.path}: {problem}; give the package that holds them: --package NAME=DIR")
 
 
 def is_robot_file(path: str) -> bool:
@@ -227,81 +234,45 @@ def is_robot_file(path: str) -> bool:
     return roots[:1] in (["robot"], ["sdf"])
 
 
-def _expand_once(file: XacroFile, outside: Mapping[str, bool]) -> Outcome | str:
-    """The outcome, or the path of a file outside all known folders about which the child asks."""
-    with os.fdopen(os.memfd_create("note"), "w+b") as note:  # there may be no writable folder
-        asked = {
-            "path": str(file.path),
-            "args": dict(file.args),
-            "packages": _as_text(file.packages),
-            "allow_env": [*file.allow_env],
-            "outside": outside,
-            "set": [*os.environ],
-            "modules": [*map(str, sys.path), _ROOT],
-            "note": note.fileno(),
-        }
-        passed_on = ("LD_LIBRARY_PATH", *VARIABLES, *file.allow_env)
-        kept = {name: os.environ[name] for name in passed_on if name in os.environ}
-        code, reply, words = _ask(json.dumps(asked).encode(), note.fileno(), kept)
-        with contextlib.suppress(ValueError):
-            answer = json.loads(reply)
-            if wanted := answer.pop("wanted", ""):
-                return str(wanted)
-            answer["warnings"] = tuple(answer["warnings"])
-            return Outcome(**answer)
-        return Outcome(error=_ended(file.path, code, note, words))
-
-
-def _as_text(packages: Mapping[str, Path]) -> dict[str, str]:
-    return {name: str(folder) for name, folder in packages.items()}
-
-
-def _ask(question: bytes, note: int, env: Mapping[str, str]) -> tuple[int, bytes, bytes]:
-    """Exit code, standard output and standard error of the child."""
+def _ask(file: XacroFile, outside: Mapping[str, bool]) -> tuple[int, bytes]:
+    """Exit code and reply of the child; of one that fails, the note of where it was, or standard error."""
+    passed_on = ("LD_LIBRARY_PATH", *VARIABLES, *file.allow_env)
+    env = {name: os.environ[name] for name in passed_on if name in os.environ}
     words = [sys.executable, "-I", "-S", "-X", "utf8", "-c", BOOT]
-    # Files in memory: their size has a limit, which a pipe would not have.
-    with os.fdopen(os.memfd_create("out"), "w+b") as out, os.fdopen(os.memfd_create("err"), "w+b") as err:
+    plain = replace(file, args=dict(file.args), packages=dict(file.packages), allow_env=[*file.allow_env])
+    question = pickle.dumps([*map(str, sys.path), _ROOT]) + pickle.dumps((plain, outside, [*os.environ]))
+    # In memory: its size has a limit, which a pipe would not have, and there may be no writable folder.
+    with os.fdopen(os.memfd_create("reply"), "rb") as reply:
         try:
             # A session of its own: only this process gets Ctrl-C, and it always ends the child.
-            child = subprocess.Popen(
-                words, stdin=subprocess.PIPE, stdout=out, stderr=err, pass_fds=(note,), env=env, start_new_session=True
-            )
+            code = subprocess.run(
+                words, input=question, stdout=reply, stderr=reply, env=env, start_new_session=True, timeout=PATIENCE
+            ).returncode
+        except subprocess.TimeoutExpired:
+            code = -signal.SIGKILL
         except OSError as error:
             raise RobotError(f"cannot start {sys.executable} to expand xacro: {error.strerror}") from None
-        try:
-            child.communicate(question, PATIENCE)
-        except subprocess.TimeoutExpired:
-            out.truncate(0)
-        finally:
-            child.kill()
-            child.wait()
-            with contextlib.suppress(OSError):
-                if child.stdin:
-                    child.stdin.close()
-        out.seek(0)
-        err.seek(0)
-        return child.returncode, out.read(), err.read(MAX_WORDS)
+        reply.seek(0)
+        return code, reply.read(MAX_NOTE if code else -1)
 
 
-def _ended(path: Path, code: int, note: IO[bytes], words: bytes) -> str:
-    where, what = _noted(path, note)
+def _ended(path: Path, code: int, found: bytes) -> str:
+    """Why a child ended with a `code`, having left a note of where it was, or words of its interpreter's."""
+    try:
+        file, line, expression = msgspec.convert(json.loads(found.split(b"\n")[0]), tuple[str, int, str])
+        where = f"{file}, line {line}" if file else str(path)
+        what = f"the expression {cut(expression, 200)}" if expression else "this element"
+        last = f"exit code {code}"
+    except (ValueError, RecursionError):
+        where, what = str(path), "the file"
+        last = (found.decode("utf-8", "replace").strip().splitlines() or [f"exit code {code}"])[-1]
     if code == -signal.SIGPROF:
         return f"{where}: {what} takes longer than the limit of {STEP_TIME:g} s"
     if code == -signal.SIGXCPU:
         return f"{where}: the file takes longer than the limit of {PROCESSOR_TIME} s"
     if code == -signal.SIGKILL:
         return f"{where}: {what} was ended after waiting more than {PATIENCE:g} s or out of memory"
-    last = words.decode("utf-8", "replace").strip().splitlines()[-1:] or [f"exit code {code}"]
-    return f"{where}: xacro failed at {what}: {last[0]}"
-
-
-def _noted(path: Path, note: IO[bytes]) -> tuple[str, str]:
-    try:
-        file, line, expression = json.loads(os.pread(note.fileno(), 10_000, 0).split(b"\n")[0])
-    except ValueError:
-        return str(path), "the file"
-    where = f"{file}, line {line}" if file else str(path)
-    return where, f"the expression {cut(expression, 200)}" if expression else "this element"
+    return f"{where}: xacro failed at {what}: {last}"
 
 
 # Expansion.
@@ -379,8 +350,8 @@ def _key(file: XacroFile) -> str:
         here = os.getcwd()  # where relative names start
     except OSError:
         here = ""
-    packages, allowed = _as_text(file.packages), sorted(file.allow_env)
-    asked = [str(file.path), here, dict(file.args), packages, allowed, os.path.expanduser("~")]
+    packages = {name: str(folder) for name, folder in file.packages.items()}
+    asked = [str(file.path), here, dict(file.args), packages, sorted(file.allow_env), os.path.expanduser("~")]
     return json.dumps([_FORMAT, *asked, sys.version, _code()], sort_keys=True)
 
 

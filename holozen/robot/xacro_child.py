@@ -8,6 +8,7 @@ import contextlib
 import io
 import json
 import os
+import pickle
 import re
 import signal
 import sys
@@ -35,7 +36,7 @@ from holozen.robot.packages import (
     without_home,
 )
 from holozen.robot.sandbox import limit, restrict
-from holozen.robot.xacro import PROCESSOR_TIME, STEP_TIME, Answer, Inputs, answer, unasked, unchanged
+from holozen.robot.xacro import PROCESSOR_TIME, STEP_TIME, Answer, Inputs, XacroFile, answer, unasked, unchanged
 from holozen.suggest import cut, shorten, suggest
 
 # Elements annotated with file and line, in the documents that the library reads and copies.
@@ -92,10 +93,10 @@ _NAME, _COMMA = re.compile(r"[A-Za-z_]\w*"), re.compile(r"[-+]?\d+,\d+")
 
 
 class Trace:
-    """Wraps the library's functions. `note` is a file from which the parent reads where a killed child was."""
+    """Wraps the library's functions. `reply` is the file from which the parent reads where a killed child was."""
 
-    def __init__(self, library: Any, note: int) -> None:
-        self.library, self.note = library, note
+    def __init__(self, library: Any, reply: int) -> None:
+        self.library, self.reply = library, reply
         self.calls: list[str] = []  # active macros and includes, outermost first
         self.place: Place | None = None
         self.pure = True
@@ -139,7 +140,7 @@ class Trace:
 
     def _note(self, expression: str) -> None:
         file, line = self.place or ("", 0)
-        os.pwrite(self.note, json.dumps([file, line, expression[:200]]).encode() + b"\n", 0)
+        os.pwrite(self.reply, json.dumps([file, line, expression[:200]]).encode() + b"\n", 0)
 
     def _here(self) -> str:
         return f"{self.place}: " if self.place else ""
@@ -387,9 +388,12 @@ DEEPEST_CALLS = 4000  # Python frames; the library's own 1000 and what the trace
 MAX_WORDS = 10_000  # characters of warnings
 
 
-def main(asked: dict[str, Any]) -> None:
-    out = os.dup(1)
-    os.dup2(2, 1)
+def main() -> None:
+    file, outside, variables = pickle.load(sys.stdin.buffer)
+    reply, null = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 1)
+    os.dup2(null, 2)
+    os.close(null)
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
     for number in (signal.SIGPROF, signal.SIGXCPU):
         signal.signal(number, signal.SIG_DFL)
@@ -397,11 +401,11 @@ def main(asked: dict[str, Any]) -> None:
     sys.setrecursionlimit(DEEPEST_CALLS)
     words = io.StringIO()
     with contextlib.redirect_stdout(words), contextlib.redirect_stderr(words):
-        packages = {name: Path(folder) for name, folder in asked["packages"].items()}
-        reply = Expansion(Path(asked["path"]), packages, asked).run(asked)
-    reply["warnings"] = words.getvalue()[:MAX_WORDS].splitlines()
-    with os.fdopen(out, "wb") as file:
-        file.write(json.dumps(reply).encode())
+        answer = Expansion(file, outside, variables).run(reply)
+    if isinstance(answer, dict):
+        answer["warnings"] = words.getvalue()[:MAX_WORDS].splitlines()
+    os.ftruncate(reply, 0)
+    os.pwrite(reply, json.dumps(answer).encode(), 0)
     os._exit(0)  # freeing a large document takes as long as building it
 
 
@@ -410,42 +414,40 @@ class Outside(BaseException):
 
 
 class Expansion:
-    """One run of the library, with the inputs it used."""
+    """One run of the library, with the inputs it used. `outside` says of files elsewhere whether they are robot files,
+    and `variables` are the names of those that the user has set.
+    """
 
-    def __init__(self, path: Path, packages: Mapping[str, Path], asked: Mapping[str, Any]) -> None:
-        self.path, self.packages, self.allow_env = path, packages, frozenset(asked["allow_env"])
-        self._outside: dict[str, bool] = asked["outside"]
-        self._variables: list[str] = asked["set"]
+    def __init__(self, file: XacroFile, outside: Mapping[str, bool], variables: list[str]) -> None:
+        self.path, self.packages, self.args, self.allow_env = file.path, file.packages, file.args, file.allow_env
+        self._outside, self._variables = outside, variables
         self.inputs: Inputs = {"file": {}, "glob": {}, "env": {}, "find": {}}
         self.guesses: dict[str, Path] = {}
         self._recording = self._parsing = False
 
-    def run(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        """The reply: "text" or "error", "inputs", and whether the text depends on them alone ("pure"); or "wanted", see
-        Outside.
-        """
-        library, trace = self._library(asked["note"])
+    def run(self, reply: int) -> dict[str, Any] | str:
+        """The fields of an Outcome, or the path of a file elsewhere whose kind is asked for. `reply`: see Trace."""
+        library, trace = self._library(reply)
         self._restrict()
         try:
-            text = self._expanded(library, trace, asked["args"])
-            reply: dict[str, Any] = {"text": text}
+            found = {"text": self._expanded(library, trace)}
         except Outside as file:
-            return {"wanted": str(file)}
+            return str(file)
         except Exception as error:  # an expression in the file may raise anything
             trace.quiet()
-            reply = {"error": describe(error, trace, self.path, self.guesses)}
+            found = {"error": describe(error, trace, self.path, self.guesses)}
         self._recording = False
-        text = reply.get("text", "")
+        text = found.get("text", "")
         pure = trace.pure and " at 0x" not in text and unchanged(self.inputs, self.path, self.packages)
-        return reply | {"inputs": self.inputs, "pure": pure}
+        return {**found, "inputs": self.inputs, "pure": pure}
 
-    def _library(self, note: int) -> tuple[Any, Trace]:
+    def _library(self, reply: int) -> tuple[Any, Trace]:
         import xacro
         import xacro.substitution_args  # the library would import it late, and its files would look like inputs
 
         xacro.init_stacks(str(self.path))
         keep_places(lambda: str(xacro.filestack[-1]))
-        trace = Trace(xacro, note)
+        trace = Trace(xacro, reply)
         xacro.parse = self._parse(xacro, trace)
         setattr(xacro, "open", self._open)  # noqa: B010
         self._answer_find()
@@ -464,12 +466,12 @@ class Expansion:
                 f"this kernel lacks {lacks}: only xacro itself keeps {self.path} from files outside of known packages"
             )
 
-    def _expanded(self, library: Any, trace: Trace, args: dict[str, str]) -> str:
+    def _expanded(self, library: Any, trace: Trace) -> str:
         self._recording = True
-        arguments = Arguments(args)
+        arguments = Arguments(self.args)
         document = library.process_file(str(self.path), mappings=arguments)
         trace.quiet()
-        for warning in unasked(self.path, args, arguments.asked):
+        for warning in unasked(self.path, self.args, arguments.asked):
             print(warning)
         text = str(document.toprettyxml(indent="  "))
         check_size(len(text), f"{self.path} (expanded)")

@@ -15,8 +15,8 @@ from collections.abc import Callable, Iterable
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from holozen.transport.errors import TIMEOUT, BusError, ServiceError
-from holozen.transport.samples import Sample
+from holozen.transport.errors import TIMEOUT, ServiceError
+from holozen.transport.samples import Sample, until_closed
 from holozen.transport.services import answer_in_turn, refusal, refuse
 
 if TYPE_CHECKING:
@@ -285,11 +285,8 @@ class ActionServer(Goals):
         return reply, ""
 
     def _wait_for_results(self) -> None:
-        while True:
-            try:
-                self._result(self._results.recv())
-            except BusError:
-                return
+        for query in until_closed(self._results.recv):
+            self._result(query)
 
     def _result(self, query: Any) -> None:
         """Answer a request for a result, or keep it until the goal ends."""
@@ -322,7 +319,7 @@ def _answered_later(_request: Any) -> Any:
 
 
 def wait_for_result(
-    node: Node, action: str, payload: bytes, encoding: str, closed: Callable[[], bool] = lambda: False
+    node: Node, action: str, payload: bytes, encoding: str, closed: Callable[[], bool]
 ) -> Sample | None:
     """Ask for the result of a goal, and wait until the goal has ended; None if `closed` became true before.
 

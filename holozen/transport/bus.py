@@ -15,7 +15,7 @@ from holozen import wire
 from holozen.suggest import cut, shorten
 from holozen.transport import services
 from holozen.transport.errors import BusError
-from holozen.transport.graph import Definition
+from holozen.transport.graph import definition
 from holozen.transport.node import Node, checked_wire
 from holozen.transport.peer_clocks import PeerClocks, clock_key
 from holozen.transport.pubsub import Gets, Latest, Publisher, RawPublisher, Subscription
@@ -96,12 +96,9 @@ class Bus(Node):
         make: Callable[..., Publisher[M]] = partial(Publisher, kind, wire, self._queued)
         return self._publish(make, key, kind.ROS, codec.encoding(wire, kind), priority, block, dead_man)
 
-    def publisher_raw(
-        self, key: str, type_name: str, encoding: str, priority: str = "DATA", *, block: bool = False,
-        dead_man: bool = True,
-    ) -> RawPublisher:  # fmt: skip
-        """A writer of bytes, in that encoding by default; otherwise as `publisher`."""
-        return self._publish(RawPublisher, key, type_name, encoding, priority, block, dead_man)
+    def publisher_raw(self, key: str, type_name: str, encoding: str, *, dead_man: bool = True) -> RawPublisher:
+        """A writer of bytes, in that encoding by default, at the priority DATA; otherwise as `publisher`."""
+        return self._publish(RawPublisher, key, type_name, encoding, "DATA", False, dead_man)
 
     def _publish(
         self, make: Callable[..., P], key: str, type_name: str, encoding: str, priority: str, block: bool,
@@ -191,7 +188,7 @@ class Bus(Node):
             return
         self._defined.add(interface.name)
         text = definitions.whole_text(interface)
-        self._keep(Definition(self.session, zenoh.handlers.RingChannel(16), interface.name, text))
+        self._keep(definition(self.session, zenoh.handlers.RingChannel(16), interface.name, text))
 
     def subscribe(
         self, key: str, *kinds: type[M], depth: int = 64, limit: int = 0, dealt: bool = False

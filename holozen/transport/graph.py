@@ -283,28 +283,23 @@ def version(package: str) -> str:
         return ""
 
 
-class Definition(Answers):
+def definition(session: Any, channel: Any, type_name: str, text: str) -> Answers:
     """Answers queries for the definition of a type."""
-
-    def __init__(self, session: Any, channel: Any, type_name: str, text: str) -> None:
-        key = definition_key(str(session.zid()), type_name)
-        super().__init__(
-            session.declare_queryable(key, channel), lambda query: query.reply(key, text, encoding="text/plain")
-        )
+    key = definition_key(str(session.zid()), type_name)
+    queryable = session.declare_queryable(key, channel)
+    return Answers(queryable, lambda query: query.reply(key, text, encoding="text/plain"))
 
 
-class Peers(Answers):
+def peers(session: Any, channel: Any, is_node: bool = False) -> Answers:
     """Answers queries for the sessions that a holder of a meeting point is linked to, separated by spaces. One that
     `is_node` names itself, too: all others are linked to it, so if it names no more there are no more.
     """
+    key, own = ALL_PEERS.replace("*", str(session.zid())), [session.zid()] if is_node else []
 
-    def __init__(self, session: Any, channel: Any, is_node: bool = False) -> None:
-        key, own = ALL_PEERS.replace("*", str(session.zid())), [session.zid()] if is_node else []
+    def answer(query: Any) -> None:
+        query.reply(key, " ".join(map(str, [*own, *session.info.peers_zid()])), encoding="text/plain")
 
-        def answer(query: Any) -> None:
-            query.reply(key, " ".join(map(str, [*own, *session.info.peers_zid()])), encoding="text/plain")
-
-        super().__init__(session.declare_queryable(key, channel), answer)
+    return Answers(session.declare_queryable(key, channel), answer)
 
 
 class Witness(Answers):

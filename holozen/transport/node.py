@@ -23,7 +23,7 @@ from holozen.suggest import cut
 from holozen.transport import graph as graphs
 from holozen.transport.connection import UNIX, Connection, from_environment
 from holozen.transport.errors import BusError
-from holozen.transport.graph import Graph, NodeInfo, Peers
+from holozen.transport.graph import Graph, NodeInfo, peers
 from holozen.transport.samples import Declared, RawSubscriber, Replies, Sample, source
 from holozen.transport.session import (
     CLOSE_LIMIT,
@@ -120,7 +120,7 @@ class Node:
 
                 report(f"{node}: {exposure(self.exposed)}")
             if self._opened().point:
-                self._keep(Peers(self.session, zenoh.handlers.RingChannel(16), is_node=True))
+                self._keep(peers(self.session, zenoh.handlers.RingChannel(16), is_node=True))
                 self._keep(witness(self.session))
             _ = self.listing
 
@@ -232,7 +232,7 @@ class Node:
         self._declared.add(declared)
         return declared
 
-    def announce(self, kind: str = "node", type_name: str = "", key: str = "") -> Any:
+    def announce(self, kind: str, type_name: str = "", key: str = "") -> Any:
         """List a node or an endpoint in the graph for as long as the token is kept. Raises BusError."""
         endpoint = graphs.Endpoint(key, kind, type_name, self.node, self.id)
         with one_line(f"key {key!r}"):
@@ -252,9 +252,9 @@ class Node:
         """
         attachment = f"{self.source};{number}" if number else self.source
         # Deliver each reply as it comes: by default the first one is held back until all servers have answered.
-        request = {"consolidation": zenoh.ConsolidationMode.NONE} | request
+        at_once = zenoh.ConsolidationMode.NONE
         with one_line(f"key {key!r}"):
-            replies = self.session.get(key, timeout=timeout, attachment=attachment, **request)
+            replies = self.session.get(key, timeout=timeout, attachment=attachment, consolidation=at_once, **request)
         return Replies(replies, replier)
 
     def served(self, key: str) -> Callable[[], bool]:
@@ -272,9 +272,8 @@ class Node:
     def ask_all(self, key: str, timeout: float, **request: Any) -> Replies:
         """Query all servers of `key`, ahead of other traffic."""
         return self.ask(
-            key, timeout, target=zenoh.QueryTarget.ALL, consolidation=zenoh.ConsolidationMode.NONE,
-            priority=zenoh.Priority.REAL_TIME, express=True, congestion_control=zenoh.CongestionControl.BLOCK,
-            **request,
+            key, timeout, target=zenoh.QueryTarget.ALL, priority=zenoh.Priority.REAL_TIME, express=True,
+            congestion_control=zenoh.CongestionControl.BLOCK, **request,
         )  # fmt: skip
 
     def last_messages(self, publishers: Iterable[graphs.Endpoint]) -> Iterator[Sample]:

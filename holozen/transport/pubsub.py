@@ -9,8 +9,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from holozen.messages import CodecError
-from holozen.transport.errors import BusError
-from holozen.transport.samples import Answers, Declared, RawSubscriber, Sample
+from holozen.transport.samples import Answers, Declared, RawSubscriber, Sample, until_closed
 from holozen.wire import is_command
 
 if TYPE_CHECKING:
@@ -299,11 +298,7 @@ class Latest(Generic[M]):
         self._subscription.close()
 
     def _keep(self) -> None:
-        while True:
-            try:
-                received: Received[Any] = self._subscription.recv()
-            except BusError:
-                return
+        for received in until_closed(self._subscription.recv):
             with self._lock:
                 if received.message is None:
                     self.bad += 1

@@ -247,8 +247,7 @@ class Gateway:
         interface = self._interface(one.type) if rmw.TOPIC.fullmatch(one.key) else None
         if not interface or (interface.kind == "srv") != (one.kind == "srv"):
             return None
-        is_latched = graphs.is_latched(one.key) or one.key.endswith(STATUS)
-        latched = one.kind == "pub" and is_latched
+        latched = one.kind == "pub" and (graphs.is_latched(one.key) or one.key.endswith(STATUS))
         number, name = self._numbers.setdefault(f"{one}", len(self._numbers)), self._named(one.node)[1]
         return rmw.Endpoint(
             one.kind, one.key, interface.name, self._form.hash(interface), name, self._id, number, latched
@@ -390,7 +389,7 @@ class Gateway:
 
     def _stops(self, type_name: str, payload: bytes) -> bool:
         """Whether a command is a velocity of zero, which is forwarded at any age."""
-        if type_name not in ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"):
+        if type_name not in wire.VELOCITIES:
             return False
         try:
             value = cdr.read(self._registry.find(type_name), payload)

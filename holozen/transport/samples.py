@@ -9,10 +9,12 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from holozen.console import report
 from holozen.transport.errors import BusError
+
+T = TypeVar("T")
 
 MAX_ATTACHMENT_BYTES = 1000  # longer ones are not read
 LARGE = 1_000_000  # bytes; memory of larger payloads is returned to the system
@@ -329,6 +331,13 @@ class Dealer(Declared):
         if ring or self._is_queryable or "*" not in key:
             return (ring,) if ring else ()
         return [ring for key, ring in self._rings.items() if key_expr.intersects(key)]
+
+
+def until_closed(recv: Callable[[], T]) -> Iterator[T]:
+    """What `recv` returns, again and again until it raises BusError."""
+    with contextlib.suppress(BusError):
+        while True:
+            yield recv()
 
 
 class RawSubscriber(Declared):

@@ -14,7 +14,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from holozen.console import report
 from holozen.transport.errors import TIMEOUT, BusError, Elsewhere, NoReply, ServiceError
-from holozen.transport.samples import MAX_ATTACHMENT_BYTES, Declared, Ring, Sample, release_memory, source_in
+from holozen.transport.samples import (
+    MAX_ATTACHMENT_BYTES,
+    Declared,
+    Ring,
+    Sample,
+    release_memory,
+    source_in,
+    until_closed,
+)
 
 if TYPE_CHECKING:
     from holozen.messages import Message
@@ -161,11 +169,8 @@ class Server(Declared):
         self.thread.start()
 
     def _serve(self) -> None:
-        while True:
-            try:
-                self.keep(self.recv())
-            except BusError:
-                return
+        for query in until_closed(self.recv):
+            self.keep(query)
             while self.answer_pending(most=1):
                 pass
 

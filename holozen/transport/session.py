@@ -19,7 +19,7 @@ from holozen.console import report
 from holozen.transport import rendezvous
 from holozen.transport.connection import CLIENT_TRY, Connection, are_near, covers, socket_path
 from holozen.transport.errors import BusError
-from holozen.transport.graph import WITNESSED, Graph, Peers, Witness
+from holozen.transport.graph import WITNESSED, Graph, Witness, peers
 
 LAST = 1.0  # s to wait for threads at the end of the process
 MAX_TOKENS = 1 << 15  # that wait, of 240 bytes each, which Zenoh takes bit by bit in a process's first hours
@@ -289,7 +289,7 @@ def open_point(endpoint: str) -> Callable[[], None] | None:
         return None
     # It marks a session of ours that is not a node.
     token = session.liveliness().declare_token(f"@holozen/{session.zid()}/rendezvous/rendezvous")
-    answers = Peers(session, zenoh.handlers.RingChannel(16)), witness(session)
+    answers = peers(session, zenoh.handlers.RingChannel(16)), witness(session)
 
     def close_point() -> None:
         close(session, token, *(end for one in answers for end in one.ends))
@@ -345,14 +345,12 @@ def opening(error: Exception, mode: str, where: str, patience: float | None) -> 
             return "cannot open Zenoh: a client needs --connect ENDPOINT, such as tcp/10.0.0.2:7447"
         within = f" within {patience:g} s" if patience else ""
         return f"cannot open Zenoh: no router answers at {where}{within}; `holozen router` runs one"
-    if text.startswith("Can not create a new TCP listener bound to "):
-        endpoint, _, why = text.removeprefix("Can not create a new TCP listener bound to ").partition(": ")
-        return f"cannot open Zenoh: cannot listen at {endpoint}: {_system(why)}"
-    if text.startswith("Can not create a new TLS listener on "):
-        place, _, why = text.removeprefix("Can not create a new TLS listener on ").partition(": ")
-        return f"cannot open Zenoh: cannot listen at tls/{place}: {_system(why)}"
-    if text.startswith("Can not create a new UnixSocketStream listener on "):
-        path, _, why = text.removeprefix("Can not create a new UnixSocketStream listener on ").partition(" - ")
+    start, _, rest = text.partition(" listener bound to " if "TCP" in text else " listener on ")
+    if start in ("Can not create a new TCP", "Can not create a new TLS"):
+        place, _, why = rest.partition(": ")
+        return f"cannot open Zenoh: cannot listen at {'tls/' * start.endswith('TLS')}{place}: {_system(why)}"
+    if start == "Can not create a new UnixSocketStream":
+        path, _, why = rest.partition(" - ")
         held = "another process listens there" if "acquire lock" in why else why
         return f"cannot open Zenoh: cannot listen at {path}: {held}"
     return f"cannot open Zenoh: {text}"

@@ -85,6 +85,22 @@ class YieldPolicy:
             self.yielded_to = EARLIER
 
 
+class Backlog:
+    """Whether goals that arrive now may have waited for this process, or in a link."""
+
+    def __init__(self) -> None:
+        self._looked, self._until, self._why = math.inf, -math.inf, ""
+
+    def look(self, now: float, is_silent: bool) -> str:
+        """Why a goal that arrives at `now` (s) is refused; empty if it cannot be old. `is_silent`: no odom comes."""
+        before, self._looked = self._looked, now
+        if now - before > SUSPENDED:
+            self._until, self._why = now + CATCHING_UP, LATE
+        elif is_silent:  # the next look may be as far away as two attempts to reach a service
+            self._until, self._why = now + CATCHING_UP + 2 * PATIENCE, HELD_UP
+        return self._why if now < self._until else ""
+
+
 class Follower:
     """Drives one robot from goal to goal until `stop` is set. `held`: it waits for a resume first.
 
@@ -105,8 +121,7 @@ class Follower:
         self._commands: Publisher[Twist] = bus.publisher(key_for("cmd_vel", robot), Twist, PRIORITY_OF["controller"])
         self._goals = bus.subscribe(key_for("goal_pose", robot), PoseStamped, depth=1, limit=LARGEST_GOAL)
         self._wanted: Journey | None = None  # the present one, of goal_pose or an action
-        self._late = LATE  # why a goal that came by then is refused
-        self._looked, self._caught_up = math.inf, -math.inf  # s; for goals, and until when old ones may arrive
+        self._backlog = Backlog()
         self._actions = GoalServers(bus, robot, self._refusal, report)
         self._seen = time.monotonic()  # s; the time of the last fresh odom, or of the start of the journey
         self._policy = YieldPolicy(bus.source, "--held" if held else "", robot)
@@ -156,15 +171,10 @@ class Follower:
         """The newest journey of goal_pose or an action. A new one ends the one before. A goal that may have waited for
         this process, or in a link, is refused: what happened to the robot meanwhile is unknown.
         """
-        before, self._looked = self._looked, time.monotonic()
-        if self._looked - before > SUSPENDED:
-            self._caught_up, self._late = self._looked + CATCHING_UP, LATE
-        elif self._odom.count and self._odom.read()[1] > self._odom.patience(SUSPENDED):
-            # The next look may be as far away as two attempts to reach a service.
-            self._caught_up, self._late = self._looked + CATCHING_UP + 2 * PATIENCE, HELD_UP
+        is_silent = self._odom.count > 0 and self._odom.read()[1] > self._odom.patience(SUSPENDED)
+        late = self._backlog.look(time.monotonic(), is_silent)
         received = self._goals.try_recv()
         if received is not None:
-            late = self._late if self._looked < self._caught_up else ""
             if reason := received.error or late or (received.message and self._refusal(received.message)):
                 self._report(f"goal_pose: refused: {reason}")
             elif goal := received.message:
@@ -289,7 +299,7 @@ class Follower:
             self._report_hold(reason)
         elif not fresh:
             self.halt()
-            self._report_hold(self._no_odom())
+            self._report_hold(f"waiting for {self._absence() or 'odom: it is stale, or none was received'}")
         elif odom is None or not all(abs(value) <= MAX_DISTANCE for value in odom.pose.pose.planar()):
             self.halt()
             self._report_hold(f"waiting for odom: its pose is more than {MAX_DISTANCE:g} m away")
@@ -303,10 +313,6 @@ class Follower:
                 self._report(ONLY_TURNS)
             return odom
         return None
-
-    def _no_odom(self) -> str:
-        """Why it waits for odom."""
-        return f"waiting for {self._absence() or 'odom: it is stale, or none was received'}"
 
     def _absence(self) -> str:
         """That the robot is not there, with the present ones, if no odom came in NOTICE seconds since the start; else

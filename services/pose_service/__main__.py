@@ -16,6 +16,7 @@ from holozen.transport import connection
 from holozen.transport.errors import BusError, ServiceError
 from holozen.transport.parameters import Choice, Number, Parameter, Parameters, warn_of_twin
 from holozen.transport.pubsub import Arrivals, Subscription
+from holozen.transport.samples import until_closed
 from holozen.wire import ODOM_SILENCE, key_for, robot_name
 
 from .shapes import SHAPES, Goal, GoalsError, read_goals
@@ -91,11 +92,7 @@ class Tracker:
         return ", ".join(sorted(key.removesuffix("odom").rstrip("/") or "'' (at the root)" for key in recent))
 
     def _receive(self) -> None:
-        while True:
-            try:
-                received = self._odoms.recv()
-            except BusError:
-                return
+        for received in until_closed(self._odoms.recv):
             if received.message is not None and received.key.count("/") < 2:
                 self._record(received.key, received.message)
 

@@ -120,7 +120,8 @@ def main(argv: list[str] | None = None) -> int:
             share = shard.Share(mine, bus) if mine else None
             services = EntityServices(bus, entities, dict(args.package), spawns=not joins or bool(mine), share=share)
             entities.set_start()
-            loop = Loop(bus, world, entities, spec.rtf if args.rtf is None else args.rtf, services, is_clock=not joins)
+            loop = Loop(bus, world, entities, spec.rtf if args.rtf is None else args.rtf, is_clock=not joins)
+            loop.answers.append(services.answer)
             loop.answers.append(SimulationServices(bus, loop.simulation, stop.set).answer)
             if args.paused:
                 loop.simulation.pause(time.monotonic())

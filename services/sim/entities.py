@@ -319,7 +319,7 @@ class Entities:
         for entity in [entity for entity in self if entity not in self._first]:
             self.remove(entity.name)
 
-    def rebuild(self, from_start: bool = False) -> None:
+    def rebuild(self, from_start: bool) -> None:
         """Put every entity, or with `from_start` those of the start, where it was added, in an empty world."""
         self._world.clear()
         before, self._all = self._all, {}

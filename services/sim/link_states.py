@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import NamedTuple
 
+from holozen.kinematics import velocity_at
 from holozen.robot.model import Pose, RobotModel, descend
 from holozen.robot.rigid import Frame, moved_by
 from holozen.rotation import XYZ, XYZW, multiply, rotate
@@ -19,8 +20,8 @@ class LinkState(NamedTuple):
 
     def at(self, xyz: XYZ, rotation: XYZW) -> "LinkState":
         """The state of a frame that is fixed in this one, at a position (m) and rotation."""
-        (x, y, z), (a, b, c), (u, v, w) = self.xyz, rotate(self.rotation, xyz), self.angular
-        along = (self.linear[0] + v * c - w * b, self.linear[1] + w * a - u * c, self.linear[2] + u * b - v * a)
+        (x, y, z), (a, b, c) = self.xyz, rotate(self.rotation, xyz)
+        along = velocity_at((a, b, c), self.linear, self.angular)
         return LinkState((x + a, y + b, z + c), multiply(self.rotation, rotation), along, self.angular)
 
 

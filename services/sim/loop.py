@@ -4,15 +4,14 @@ import math
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 
 from holozen.bus import Bus
 from holozen.command.wait_set import Moment, ReadTimes
 from holozen.console import report
 from holozen.messages import Clock, SimulationStatus, Time
-from holozen.transport.pubsub import Publisher
 
 from .entities import Entities
-from .io.entity_services import EntityServices
 from .physics.world import World
 from .robot import Robot
 from .schedule import Pace, Schedule
@@ -31,23 +30,18 @@ FAULTS = (ArithmeticError, ValueError)  # of a body whose position became NaN
 
 class Loop:
     """Runs one world with its entities at `rtf` times real time (0: as fast as possible). With `is_clock` it publishes
-    its time.
+    its time. The `answers` are called between steps, and return whether more requests wait.
     """
 
-    def __init__(
-        self, bus: Bus, world: World, entities: Entities, rtf: float, services: EntityServices | None = None,
-        is_clock: bool = True,
-    ) -> None:  # fmt: skip
+    def __init__(self, bus: Bus, world: World, entities: Entities, rtf: float, is_clock: bool = True) -> None:
         self._bus, self._world, self._entities, self._robots = bus, world, entities, entities.robots
         self.pace = Pace(world.spec.step, rtf, time.monotonic())
-        self.answers = [services.answer] if services else []  # called between steps; each returns whether more wait
-        self._served = self.polled = 0.0
+        self.answers: list[Callable[[], bool]] = []
+        self._served = self._polled = 0.0
         self._more_wait = False  # whether requests were left unanswered
-        self._clock: Publisher[Clock] | None = bus.publisher("clock", Clock) if is_clock else None
+        self._clock = bus.publisher("clock", Clock) if is_clock else None
         self._clock_due = Schedule(CLOCK_RATE)
-        self._status: Publisher[SimulationStatus] | None = None
-        if is_clock:
-            self._status = bus.publisher("simulation_status", SimulationStatus)
+        self._status = bus.publisher("simulation_status", SimulationStatus) if is_clock else None
         self._status_at = self._shown_at = self._reported_at = -math.inf
         self._reported = 0  # overruns
         self._marks: deque[tuple[float, float]] = deque()  # real and sim time of past statuses
@@ -142,9 +136,9 @@ class Loop:
             robot.publish_status(now)
             statuses.set(robot, now + 1 / STATUS_RATE)
         self._entities.watch_senders(moment)  # after their last commands were read
-        if is_asked or now - self.polled >= POLL:
-            self._entities.requests.read(moment._replace(since=min(since, self.polled or since)))
-            self.polled = now
+        if is_asked or now - self._polled >= POLL:
+            self._entities.requests.read(moment._replace(since=min(since, self._polled or since)))
+            self._polled = now
         if steps:
             steps.may_begin = True  # all commands sent before the request have been read
         if now - self._served >= (PAUSED_POLL if self.simulation.is_paused else POLL):

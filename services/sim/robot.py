@@ -43,11 +43,13 @@ class Robot:
 
     def __init__(
         self, bus: Bus, name: str, prefix: str, model: RobotModel, mover: Mover, limits: tuple[float, float],
-        senders: Senders, phase: float = 0.0, time: CommandTime | None = None,
-        keep_stop: Callable[[], str] = lambda: "",
+        senders: Senders, phase: float, time: CommandTime, keep_stop: Callable[[], str],
     ) -> None:  # fmt: skip
         self._model, self.prefix = model, prefix
         self._agenda: Agenda[Robot] = Agenda()  # unused, until `schedule_on`
+        self._pushed_on: dict[str, list[Force]] = {}  # the forces by the keys of their commands
+        for force in model.forces:
+            self._pushed_on.setdefault(key_for(force.topic, prefix), []).append(force)
         self._set_body(mover)
         drive = model.drive
         command = command_key(model, prefix)
@@ -60,8 +62,7 @@ class Robot:
         self.force_arbiter = self._spare if self.drives else self.arbiter
         self.keys = command, key_for(drive.odometry_topic, prefix) if drive else ""  # of commands and odometry
         self._tf: Publisher[TFMessage] = bus.publisher(key_for("tf", namespace), TFMessage)
-        keys = _forces(model, prefix)
-        refusal = "" if self.drives else NO_DRIVE.format(keys=listed(keys))
+        refusal = "" if self.drives else NO_DRIVE.format(keys=listed(self._pushed_on))
         self._input = twist_input = TwistInput(
             command, self.arbiter, senders, *limits, others=aliases(model, prefix), refusal=refusal, lines=LINES
         )
@@ -73,9 +74,9 @@ class Robot:
         groups = [(motors.names, arbiter) for motors, arbiter in pairs if motors]
         stats = twist_input.stats if drive else CommandStats(lines=LINES)
         joint_input = JointInput(key_for("joint_command", namespace), senders, stats, groups, mover.names)
-        force_input = ForceInput(tuple(keys), self.force_arbiter, senders, stats)
+        force_input = ForceInput(tuple(self._pushed_on), self.force_arbiter, senders, stats)
         self._filters = (twist_input.freshness, joint_input.freshness, force_input.freshness)
-        self._pushes = [bus.subscribe(key, Wrench, limit=MAX_COMMAND_BYTES, dealt=True) for key in keys]
+        self._pushes = [bus.subscribe(key, Wrench, limit=MAX_COMMAND_BYTES, dealt=True) for key in self._pushed_on]
         self._push_readers = [*map(force_input.reader, self._pushes)]
         self._of_members = bus.member is not None
         self._joints = JointTopics(bus, namespace, model, mover.names, prefix, joint_input, self._tf)
@@ -152,8 +153,8 @@ class Robot:
         self._wheels, self._others = _motors(mover, self._model)
         self._jointed = mover.body if isinstance(mover.body, JointedBody) else None
         brakes = None if self.drives else self._others
-        forces = _forces(self._model, self.prefix)
-        self._forces = Forces(self._jointed, forces, self._model, brakes) if self._jointed and forces else None
+        pushed = self._jointed if self._pushed_on else None
+        self._forces = Forces(pushed, self._pushed_on, self._model, brakes) if pushed else None
 
     def _activate(self) -> None:
         self._agenda.active[self] = None
@@ -187,7 +188,7 @@ class Robot:
     @property
     def command_keys(self) -> tuple[str, ...]:
         """The keys of its commands."""
-        return (*self._input.keys, self._joints.command_key, *_forces(self._model, self.prefix))
+        return (*self._input.keys, self._joints.command_key, *self._pushed_on)
 
     @property
     def drives(self) -> bool:
@@ -283,14 +284,6 @@ class Robot:
         self._tf.close()
         if self._sensors:
             self._sensors.close()
-
-
-def _forces(model: RobotModel, prefix: str) -> dict[str, list[Force]]:
-    """The forces of a robot with this `prefix`, by their keys."""
-    found: dict[str, list[Force]] = {}
-    for force in model.forces:
-        found.setdefault(key_for(force.topic, prefix), []).append(force)
-    return found
 
 
 def _motors(mover: Mover, model: RobotModel) -> tuple[Motors | None, Motors | None]:

@@ -24,9 +24,9 @@ from holozen.ros.launch.launch_context import (
 from holozen.ros.launch.launch_description import Action, Entities, checked
 from holozen.ros.launch.launch_description_sources import PythonLaunchDescriptionSource
 from holozen.ros.launch.stand_ins import (
+    INSTEAD,
     PROGRAMS,
     SCRIPTS,
-    SKIPPED,
     Executable,
     holozen_command,
     package_flags,
@@ -310,9 +310,9 @@ class ExecuteProcess(Action):
             return PROGRAMS[program](context, Executable(self, "", program, words[1:]))
         if program == "ros2" and len(words) > 1:
             return self._ros2(context, words[1:])
-        for name, reason in SKIPPED.items():
-            if name.partition("/")[0] == program:
-                skip(context, self, program, reason)
+        for name, found in INSTEAD.items():
+            if found.reason and name.partition("/")[0] == program:
+                skip(context, self, program, found.reason)
                 return None
         is_python = program in _PYTHON or program.startswith("python3.")
         name = text(context, self.name)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
+from typing import NamedTuple
 
 from holozen import data
 from holozen.console import report
@@ -24,50 +25,56 @@ SPAWN_TIMEOUT = "60"  # s for the sim to start
 NOWHERE = Path("/holozen-stands-in-for")  # the folder of packages that exist by name only
 NO_WINDOW = "launch: Gazebo's window is left out; `holozen map` in another terminal shows the robots"
 
-NEEDS_A_TERMINAL = "it needs a terminal of its own: `holozen teleop` in another one"
-SKIPPED = {
-    "robot_state_publisher/*": "the sim itself publishes joint_states and tf",
-    "joint_state_publisher/*": "the sim itself publishes joint_states",
-    "joint_state_publisher_gui/*": "the sim publishes joint_states; `holozen topic pub joint_command` moves joints",
-    "rviz2/*": "`holozen map` in another terminal shows the robots, `holozen topic echo` the messages",
-    "gazebo_ros/gzclient": "`holozen map` in another terminal shows the robots",
-    "ros_gz_bridge/*": "the sim is on the keys itself",
-    "ros_ign_bridge/*": "the sim is on the keys itself",
-    "ros_gz_image/*": "the sim is on the keys itself",
-    "controller_manager/*": "the sim moves joints itself, by the key joint_command",
-    "teleop_twist_keyboard/*": NEEDS_A_TERMINAL,
-    "teleop_twist_joy/*": f"{NEEDS_A_TERMINAL}, with --joystick",
-    "joy/*": f"{NEEDS_A_TERMINAL}, with --joystick",
-    "rqt*/*": "`holozen plot`, `holozen graph` and `holozen topic` show the same",
-    "plotjuggler/*": "`holozen plot` in another terminal plots numbers",
-}
-"""package/executable -> why it is skipped, and what to use."""
 
-VERBS = {
-    "tf2_ros/tf2_echo": "holozen tf echo",
-    "tf2_ros/tf2_monitor": "holozen tf echo",
-    "tf2_tools/view_frames*": "holozen view` or `holozen tf echo",
-    "demo_nodes_*/talker": "holozen topic pub chatter std_msgs/msg/String '{data: Hello}'",
-    "demo_nodes_*/listener": "holozen topic echo chatter",
-    "turtlesim/turtlesim_node": "holozen up",
-    "turtlesim/turtle_teleop_key": "holozen teleop",
-    "xacro/*": "holozen xacro",
-    "teleop_twist_keyboard/*": "holozen teleop",
-    "teleop_twist_joy/*": "holozen teleop --joystick",
-    "joy/*": "holozen teleop --joystick",
-    "rviz2/*": "holozen view` or `holozen map",
-    "foxglove_bridge/*": "holozen view --foxglove",
-    "gazebo_ros/spawn_entity*": "holozen spawn",
-    "ros_gz_sim/create": "holozen spawn",
-    "ros_ign_gazebo/create": "holozen spawn",
-    "gazebo_ros/gzclient": "holozen view` or `holozen map",
-    "gazebo_ros/gz*": "holozen sim --empty",
-    "gazebo_ros/gazebo": "holozen sim --empty",
-    "ros_gz_sim/gz*": "holozen sim --empty",
+class Instead(NamedTuple):
+    """What there is here in place of one of ROS's own nodes. A launch file leaves it out if there is a `reason`."""
+
+    command: str = ""  # to type in its place
+    reason: str = ""  # why a launch leaves it out, and what to use
+    arguments: int | None = 0  # how many of its arguments the command takes; None: all
+
+
+NEEDS_A_TERMINAL = "it needs a terminal of its own: `holozen teleop` in another one"
+ON_THE_KEYS = "the sim is on the keys itself"
+INSTEAD = {
+    "robot_state_publisher/*": Instead(reason="the sim itself publishes joint_states and tf"),
+    "joint_state_publisher/*": Instead(reason="the sim itself publishes joint_states"),
+    "joint_state_publisher_gui/*": Instead(
+        reason="the sim publishes joint_states; `holozen topic pub joint_command` moves joints"
+    ),
+    "rviz2/*": Instead(
+        "holozen view` or `holozen map",
+        "`holozen map` in another terminal shows the robots, `holozen topic echo` the messages",
+    ),
+    "gazebo_ros/gzclient": Instead(
+        "holozen view` or `holozen map", "`holozen map` in another terminal shows the robots"
+    ),
+    "ros_gz_bridge/*": Instead(reason=ON_THE_KEYS),
+    "ros_ign_bridge/*": Instead(reason=ON_THE_KEYS),
+    "ros_gz_image/*": Instead(reason=ON_THE_KEYS),
+    "controller_manager/*": Instead(reason="the sim moves joints itself, by the key joint_command"),
+    "teleop_twist_keyboard/*": Instead("holozen teleop", NEEDS_A_TERMINAL),
+    "teleop_twist_joy/*": Instead("holozen teleop --joystick", f"{NEEDS_A_TERMINAL}, with --joystick"),
+    "joy/*": Instead("holozen teleop --joystick", f"{NEEDS_A_TERMINAL}, with --joystick"),
+    "rqt*/*": Instead(reason="`holozen plot`, `holozen graph` and `holozen topic` show the same"),
+    "plotjuggler/*": Instead(reason="`holozen plot` in another terminal plots numbers"),
+    "tf2_ros/tf2_echo": Instead("holozen tf echo", arguments=2),
+    "tf2_ros/tf2_monitor": Instead("holozen tf echo"),
+    "tf2_tools/view_frames*": Instead("holozen view` or `holozen tf echo"),
+    "demo_nodes_*/talker": Instead("holozen topic pub chatter std_msgs/msg/String '{data: Hello}'"),
+    "demo_nodes_*/listener": Instead("holozen topic echo chatter"),
+    "turtlesim/turtlesim_node": Instead("holozen up"),
+    "turtlesim/turtle_teleop_key": Instead("holozen teleop"),
+    "xacro/*": Instead("holozen xacro", arguments=None),
+    "foxglove_bridge/*": Instead("holozen view --foxglove"),
+    "gazebo_ros/spawn_entity*": Instead("holozen spawn"),
+    "ros_gz_sim/create": Instead("holozen spawn"),
+    "ros_ign_gazebo/create": Instead("holozen spawn"),
+    "gazebo_ros/gz*": Instead("holozen sim --empty"),
+    "gazebo_ros/gazebo": Instead("holozen sim --empty"),
+    "ros_gz_sim/gz*": Instead("holozen sim --empty"),
 }
-"""package/executable -> the command to type in its place."""
-_WITH_ARGUMENTS = {"tf2_ros/tf2_echo": 2, "xacro/*": None}
-"""Those whose command takes the same arguments, and how many of them."""
+"""package/executable -> what there is in its place; the first that fits."""
 
 ENDING = ("controller_manager/spawner", "controller_manager/spawner.py")
 """Skipped nodes that would end by themselves, and for whose end others wait."""
@@ -115,8 +122,8 @@ def stand_in(context: LaunchContext, node: Executable) -> Entities | None:
     name = f"{node.package}/{node.name}"
     if name in NODES:
         return NODES[name](context, node)
-    reason = next((reason for pattern, reason in SKIPPED.items() if fnmatch(name, pattern)), None)
-    if reason is None:
+    reason = _instead(name).reason
+    if not reason:
         _check_stand_in(node)
         return None
     if node.package == "robot_state_publisher":
@@ -128,12 +135,15 @@ def stand_in(context: LaunchContext, node: Executable) -> Entities | None:
 
 def advice(package: str, name: str, words: Sequence[str]) -> str:
     """What to do in place of running an executable of ROS with these arguments; empty for one that is not ROS's."""
-    whole = f"{package}/{name}"
-    if pattern := next((pattern for pattern in VERBS if fnmatch(whole, pattern)), ""):
-        ours = words[: words.index("--ros-args")] if "--ros-args" in words else words
-        taken = ours[: _WITH_ARGUMENTS[pattern]] if pattern in _WITH_ARGUMENTS else ()
-        return f"use `{' '.join((VERBS[pattern], *map(shlex.quote, taken)))}`"
-    return next((reason for pattern, reason in SKIPPED.items() if fnmatch(whole, pattern)), "")
+    found = _instead(f"{package}/{name}")
+    if not found.command:
+        return found.reason
+    ours = words[: words.index("--ros-args")] if "--ros-args" in words else words
+    return f"use `{' '.join((found.command, *map(shlex.quote, ours[: found.arguments])))}`"
+
+
+def _instead(name: str) -> Instead:
+    return next((found for pattern, found in INSTEAD.items() if fnmatch(name, pattern)), Instead())
 
 
 def _check_stand_in(node: Executable) -> None:
@@ -141,7 +151,8 @@ def _check_stand_in(node: Executable) -> None:
     if node.package not in packages.stand_ins or packages.find(node.package) != packages.stand_ins[node.package]:
         return
     start = f"{node.package}/"
-    known = sorted(name.removeprefix(start) for name in (*NODES, *SKIPPED) if name.startswith(start))
+    names = (*NODES, *(name for name, found in INSTEAD.items() if found.reason))
+    known = sorted(name.removeprefix(start) for name in names if name.startswith(start))
     fault = f"package {node.package!r} has no executable {node.name!r}{suggest(node.name, known)}"
     raise LaunchError(f"{fault}; those that holozen replaces: {listed(known)}")
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from holozen.command.feedback import VELOCITIES, CommandFeedback
+from holozen.command.feedback import CommandFeedback
 from holozen.messages import CommandStatus
 from holozen.messages.codec import decoder
 from holozen.ros.rclpy.callback_groups import CallbackGroup
@@ -13,7 +13,7 @@ from holozen.ros.rclpy.qos import HistoryPolicy, QoSProfile
 from holozen.transport.bus import LARGEST_STATE
 from holozen.transport.graph import subscribers
 from holozen.transport.pubsub import Latest, Subscription
-from holozen.wire import is_command
+from holozen.wire import VELOCITIES, is_command
 
 __all__ = ["Publisher"]
 
@@ -58,9 +58,10 @@ class Publisher(Owned):
                 raise InvalidHandle(f"the publisher of {self.topic} was destroyed") from None
             raise
         if self._feedback:
-            if not isinstance(msg, bytes):
-                self._feedback.strafes |= getattr(msg, "twist", msg).linear.y != 0
-            self._feedback.look()
+            if isinstance(msg, bytes):
+                self._feedback.look()
+            else:
+                self._feedback.sent(msg)
 
     def get_subscription_count(self) -> int:
         """How many subscriptions receive what is sent now; 1 if only programs that are not holozen nodes do."""

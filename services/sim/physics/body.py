@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from holozen.kinematics import to_body
+from holozen.kinematics import to_body, velocity_at
 from holozen.limits import Planar
 from holozen.rotation import XYZ, XYZW, rotate, yaw
 
@@ -32,7 +32,7 @@ class Body:
         """The root frame's velocity and rotation rate in the world."""
         _, _, centre = self._root()
         linear, angular = self._engine.velocity(self.number)
-        return _at(linear, angular, (-centre[0], -centre[1], -centre[2])), angular
+        return velocity_at((-centre[0], -centre[1], -centre[2]), linear, angular), angular
 
     def planar(self) -> Planar:
         """The planar velocity of the root frame, in the body frame."""
@@ -47,7 +47,7 @@ class Body:
     def put(self, position: XYZ, rotation: XYZW, linear: XYZ, angular: XYZ) -> None:
         """Place the root frame in the world, with its velocity and rotation rate there."""
         centre = self._place(position, rotation)
-        self._engine.move(self.number, _at(linear, angular, centre), angular)
+        self._engine.move(self.number, velocity_at(centre, linear, angular), angular)
 
     def _place(self, position: XYZ, rotation: XYZW) -> XYZ:
         """Place the root frame in the world. Returns the offset from it to the centre of mass, in the world."""
@@ -64,9 +64,3 @@ class Body:
         """The centre of mass, the root frame's rotation, and the offset from the root to the centre, in the world."""
         position, rotation = self._engine.centre(self.number)
         return position, rotation, rotate(rotation, self._centre)
-
-
-def _at(linear: XYZ, angular: XYZ, away: XYZ) -> XYZ:
-    """The velocity of a point at an offset (m) from one that moves and turns: v + w x r."""
-    (vx, vy, vz), (wx, wy, wz), (x, y, z) = linear, angular, away
-    return vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x

@@ -20,6 +20,7 @@ MAX_IN_ONE = 16  # pybullet's MAX_COMPOUND_COLLISION_SHAPES; it silently drops t
 NOTHING = -1  # pybullet's number for no shape
 MAX_KEPT = 64  # removed bodies that are kept for reuse; each takes 0.6 us a step
 MAX_SEEN = 1000  # the same in the world of rays, which is never stepped
+HERE = (0.0, 0.0, 0.0), UPRIGHT
 FAR_AWAY: XYZ = (0.0, 0.0, 1e6)
 ASLEEP, AWAKE = 1 | 8, 2 | 4  # pybullet's flags: sleeping enabled and asleep; sleeping disabled and awake
 FREE, FIXED = (1, -1), (2, ~2)  # the engine's collision groups and masks, of free bodies and of fixed bases
@@ -41,7 +42,6 @@ class Bullet(Engine):
         self.id: int = bullet.connect(bullet.DIRECT)
         self._bodies = Bodies(self.id)
         self._links: dict[int, list[int]] = {}  # by body: the engine's link of each part
-        self._jointed: dict[int, list[int]] = {}  # by body: those links that have joints
         self._masses: dict[int, tuple[float, XYZ]] = {}  # by body: mass and inertia of the root
         self._axes: dict[int, tuple[XYZW, XYZW]] = {}  # by body: the root's principal axes, if not those of its frame
         self._floating: dict[int, dict[int, float]] = {}  # kg that gravity does not pull, by link
@@ -75,7 +75,6 @@ class Bullet(Engine):
         )
         numbers = links.numbers(number, self.id)
         self._links[number] = [numbers[own] for own, *_ in carrying]
-        self._jointed[number] = self._links[number][1:]
         self._masses[number] = (root.mass, root.inertia)
         if max(map(abs, root.axes[:3])) > 1e-9:
             self._axes[number] = (root.axes, bullet.invertTransform((0, 0, 0), root.axes)[1])
@@ -115,7 +114,7 @@ class Bullet(Engine):
 
     def remove(self, number: int) -> None:
         self._bodies.remove(number)
-        for kept in (self._links, self._jointed, self._masses, self._axes, self._floating):
+        for kept in (self._links, self._masses, self._axes, self._floating):
             kept.pop(number, None)
 
     def step(self) -> None:
@@ -185,7 +184,7 @@ class Bullet(Engine):
         return any(shape[2] == bullet.GEOM_PLANE for shape in shapes)
 
     def joints(self, number: int) -> JointStates:
-        links = self._jointed[number]
+        links = self._links[number][1:]  # all but the root's have a joint
         states = bullet.getJointStates(number, links, self.id) if links else ()
         return [state[0] for state in states], [state[1] for state in states], [state[3] for state in states]
 
@@ -242,10 +241,7 @@ class BulletRays(Rays):
 
     def add(self, shapes: tuple[PlacedShape, ...]) -> int:
         self._added += 1
-        origin = (0.0, 0.0, 0.0), UPRIGHT
-        self._bodies[self._added] = [
-            self._made.add(shape, origin, 0.0, shape) for shape in self._made.shapes.of(shapes)
-        ]
+        self._bodies[self._added] = [self._made.add(shape, HERE, 0.0, shape) for shape in self._made.shapes.of(shapes)]
         self._owners |= dict.fromkeys(self._bodies[self._added], self._added)
         return self._added
 
@@ -346,7 +342,7 @@ class Bodies:
 
     def add(
         self, kind: object, place: tuple[XYZ, XYZW], mass: float, shape: int,
-        inertial: tuple[XYZ, XYZW] = ((0.0, 0.0, 0.0), UPRIGHT), **arguments: Any,
+        inertial: tuple[XYZ, XYZW] = HERE, **arguments: Any,
     ) -> int:  # fmt: skip
         """Add a body at rest, its root frame at `place`, and its inertial frame at `inertial` in the root frame; the
         rest are arguments of createMultiBody. Bodies of equal `kind` have to be made, and have their dynamics set, in
@@ -411,12 +407,12 @@ class Links:
     def add(
         self,
         parent: int,
-        shape: int = NOTHING,
+        shape: int,
         joint: int = bullet.JOINT_FIXED,
         axis: XYZ = (0.0, 0.0, 1.0),
-        at: tuple[XYZ, XYZW] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),
+        at: tuple[XYZ, XYZW] = HERE,
         mass: float = 0.0,
-        inertial: tuple[XYZ, XYZW] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),
+        inertial: tuple[XYZ, XYZW] = HERE,
     ) -> int:
         """Add a link to link `parent` (-1: the base), its frame `at` in the parent's. Returns its index."""
         values = (mass, shape, self._visual, *at, *inertial, parent + 1, joint, axis)

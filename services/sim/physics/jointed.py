@@ -47,12 +47,8 @@ class JointedBody(Body):
         self._dt = dt
         self._joints = {part.joint.name: (index, part.joint) for index, part in enumerate(parts) if part.joint}
         self._efforts: dict[int, float] = {}  # that `push` applies, by the index of the part
-        self._begin()
-
-    def _begin(self) -> None:
+        self.names = [*self._joints]
         joints = [joint for _, joint in self._joints.values()]
-        self.names = [joint.name for joint in joints]
-        self._numbers = [number for number, _ in self._joints.values()]
         self._mimics = {
             joint.name: joint.mimic for joint in joints if joint.mimic and joint.mimic.joint in self._joints
         }
@@ -62,8 +58,8 @@ class JointedBody(Body):
     def states(self) -> JointStates:
         """The states of the joints, in the order of `names`. The effort is that of motor and friction."""
         positions, rates, efforts = self._engine.joints(self.number)
-        efforts = [self._efforts.get(index, effort) for index, effort in zip(self._numbers, efforts, strict=True)]
-        return positions, rates, efforts
+        joints = zip(self._joints.values(), efforts, strict=True)
+        return positions, rates, [self._efforts.get(number, effort) for (number, _), effort in joints]
 
     def wrench(self, part: int, at: Frame, along: bool, force: XYZ, torque: XYZ) -> None:
         """Apply a force (N) and a torque (N m) during the next step, at the origin of the frame `at` in a part.

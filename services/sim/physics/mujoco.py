@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holozen.console import report
+from holozen.kinematics import velocity_at
 from holozen.robot.errors import RobotError
 from holozen.robot.model import WorldSpec
 from holozen.robot.rigid import Part, PlacedShape
@@ -285,18 +286,16 @@ class MuJoCo(Engine):
             return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         x, y, z, *turning = self._data.qvel[kept.speed : kept.speed + 6].tolist()
         _, rotation = self.centre(number)
-        wx, wy, wz = angular = rotate(rotation, (turning[0], turning[1], turning[2]))
-        cx, cy, cz = rotate(rotation, kept.parts[0].body.centre)
-        return (x + wy * cz - wz * cy, y + wz * cx - wx * cz, z + wx * cy - wy * cx), angular
+        angular = rotate(rotation, (turning[0], turning[1], turning[2]))
+        return velocity_at(rotate(rotation, kept.parts[0].body.centre), (x, y, z), angular), angular
 
     def move(self, number: int, linear: XYZ, angular: XYZ) -> None:
         kept = self._all[number]
         if kept.static:
             return
         _, rotation = self.centre(number)
-        (x, y, z), (wx, wy, wz) = linear, angular
         cx, cy, cz = rotate(rotation, kept.parts[0].body.centre)
-        at_root = (x - wy * cz + wz * cy, y - wz * cx + wx * cz, z - wx * cy + wy * cx)
+        at_root = velocity_at((-cx, -cy, -cz), linear, angular)
         self._data.qvel[kept.speed : kept.speed + 6] = (*at_root, *rotate(conjugate(rotation), angular))
 
     def freeze(self, number: int) -> None:
@@ -341,8 +340,6 @@ class MuJoCo(Engine):
         return set(self._owner[self._model.geom_bodyid[hit]].tolist())
 
     def gap(self, one: int, other: int, within: float) -> float:
-        if not self._is_fresh:
-            self._located()
         mine, theirs = self._geoms(one), self._geoms(other)
         (low, high), (low2, high2) = self._boxes(mine), self._boxes(theirs)
         apart = np.maximum(low[:, None] - high2, low2 - high[:, None]).max(axis=2)

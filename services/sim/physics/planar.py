@@ -117,6 +117,12 @@ class Field:
         """
         return SKIN + (self.closing(speed) + self._fastest) * FAR * self.step
 
+    def near(self, body: Body, speed: float) -> set[int]:
+        """The engine's numbers of the others that are within the `margin` of a body with this speed (m/s)."""
+        ((x, y, z), (x2, y2, z2)), margin = body.box(), self.margin(speed)
+        low, high = (x - margin, y - margin, z - margin), (x2 + margin, y2 + margin, z2 + margin)
+        return self.engine.near((low, high)) - {body.number}
+
 
 def _within(distance: float, way: float) -> int:
     """The number of steps in which something covers a distance (m), `way` metres a step; at most FAR."""
@@ -204,10 +210,7 @@ class PlanarBody(Body):
         here = self.locate()
         if not self._glide:
             self.speed = max(self.speed, math.hypot(*super().twist()[0]))
-        (x, y, z), (x2, y2, z2) = self.box()
-        margin = self._field.margin(self.speed)
-        low, high = (x - margin, y - margin, z - margin), (x2 + margin, y2 + margin, z2 + margin)
-        around = self._engine.near((low, high)) - {self.number, self._field.level}
+        around = self._field.near(self, self.speed) - {self._field.level}
         steps = {number: self._steps_to(number, here) for number in around}
         near = [number for number, clear in steps.items() if clear < LOOK]
         for number in near:
@@ -228,12 +231,7 @@ class PlanarBody(Body):
             if (steps := _within(apart - SKIN, way)) >= LOOK:
                 return steps
             other.locate()
-        return _within(self._gap(number), way)
-
-    def _gap(self, number: int) -> float:
-        """The distance (m) to where the engine has another body, less SKIN."""
-        within = self._field.margin(self.speed)
-        return self._engine.gap(self.number, number, within) - SKIN
+        return _within(self._engine.gap(self.number, number, field.margin(self.speed)) - SKIN, way)
 
     def locate(self) -> XYZ:
         """Move the engine's body, which stays at the place of the last look while this one glides, to its true place.

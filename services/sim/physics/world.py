@@ -109,11 +109,8 @@ class World:
         """The engine's numbers of other bodies that `body` overlaps by more than OVERLAP, the deepest first. Planes do
         not count.
         """
-        (x, y, z), (x2, y2, z2) = body.box()
-        margin = self._field.margin(0.0)
-        low, high = (x - margin, y - margin, z - margin), (x2 + margin, y2 + margin, z2 + margin)
         depths = {}
-        for number in self.engine.near((low, high)) - {body.number}:
+        for number in self._field.near(body, 0.0):
             if other := self._field.bodies.get(number):
                 other.locate()
             depth = -self.engine.gap(body.number, number, 0.0)

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -90,6 +91,13 @@ def wrong() -> int:
     return "not a number"  # type: ignore[return-value]
 
 
+def asks() -> int:
+    """Writes the same question as its reply, whatever the answer was."""
+    number = next(number for number in range(3, 200) if is_open(number))
+    os.write(number, msgspec.msgpack.encode(["", ["open", "elsewhere.stl"], "", b""]))
+    os._exit(0)
+
+
 def misnamed() -> int:
     return os.fsdecode(b"\xfc.stl")  # type: ignore[return-value]
 
@@ -111,6 +119,7 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         (much, "it takes more than"),
         (crashed, r"its reader crashed \(SIGSEGV\)"),
         (wrong, "its reader was compromised"),
+        (asks, "its reader was compromised: it asked for 'open' again"),
         (misnamed, "the name of this file, or of one in it, is not utf-8; rename it"),
     ],
 )

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from holozen.robot import xacro
 from holozen.robot.errors import RobotError
 from holozen.robot.xacro import expand_xacro
 
@@ -90,6 +91,25 @@ def test_a_hostile_expression_has_no_way_out(home: Path, monkeypatch: pytest.Mon
             assert state() == before, name
             with pytest.raises(BlockingIOError):
                 server.accept()
+
+
+@pytest.mark.parametrize(
+    ("reply", "reported"),
+    [
+        ("5", "xacro failed at the file: its reply is neither a text nor an error"),
+        ("&quot;elsewhere&quot;", "more than 2 files are included from outside of all known packages"),  # for ever
+    ],
+)
+def test_a_reply_that_an_expression_wrote_is_an_error(
+    home: Path, monkeypatch: pytest.MonkeyPatch, reply: str, reported: str
+) -> None:
+    monkeypatch.setattr(xacro, "MAX_OUTSIDE", 2)
+    is_open = f"{OS}['path'].exists('/proc/self/fd/' + str(each))"
+    write = f"[({OS}['ftruncate'](each, 0), {OS}['write'](each, b'{reply}')) for each in range(3, 9) if {is_open}]"
+    robot = home / "robot.xacro"
+    robot.write_text(ROBOT % f"[{write}, {OS}['_exit'](0)]")
+    with pytest.raises(RobotError, match=f"robot.xacro: {reported}"):
+        expand_xacro(robot)
 
 
 def test_what_an_expression_may_do_it_still_may(home: Path) -> None:

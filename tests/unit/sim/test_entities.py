@@ -68,7 +68,8 @@ class Town:
         self.bus, self.client = wire.bus("sim"), wire.bus("client")
         self.entities = Entities(self.bus, world, (5.0, 10.0))
         self.services = EntityServices(self.bus, self.entities, {})
-        self.loop = Loop(self.bus, world, self.entities, 0.0, self.services)
+        self.loop = Loop(self.bus, world, self.entities, 0.0)
+        self.loop.answers.append(self.services.answer)
         wait_for(self.client.connected)
 
     def spawn(self, name: str = "Fred", text: str = HB_BOT, z: float = 0.0, x: float = 0.0, **fields: object) -> Entity:
