@@ -96,9 +96,12 @@ class Bus(Node):
         make: Callable[..., Publisher[M]] = partial(Publisher, kind, wire, self._queued)
         return self._publish(make, key, kind.ROS, codec.encoding(wire, kind), priority, block, dead_man)
 
-    def publisher_raw(self, key: str, type_name: str, encoding: str, *, dead_man: bool = True) -> RawPublisher:
-        """A writer of bytes, in that encoding by default, at the priority DATA; otherwise as `publisher`."""
-        return self._publish(RawPublisher, key, type_name, encoding, "DATA", False, dead_man)
+    def publisher_raw(
+        self, key: str, type_name: str, encoding: str, priority: str = "DATA", *, block: bool = False,
+        dead_man: bool = True,
+    ) -> RawPublisher:  # fmt: skip
+        """A writer of bytes, in that encoding by default; otherwise as `publisher`."""
+        return self._publish(RawPublisher, key, type_name, encoding, priority, block, dead_man)
 
     def _publish(
         self, make: Callable[..., P], key: str, type_name: str, encoding: str, priority: str, block: bool,
