@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from holozen.check.engine import Mistake, Subject, rule
 from holozen.check.spelling import nearest
 from holozen.robot.elements import Tag
-from holozen.robot.gazebo_plugins import DRIVES, KNOWN, MOVING_ELSEWHERE, file_name, file_of, kind_of
+from holozen.robot.gazebo_plugins import DRIVES, KNOWN, MOVING_ELSEWHERE, OMNI, file_name, file_of, kind_of
 from holozen.suggest import listed, suggest
 
 SUGGESTED = ("gazebo_ros_planar_move", "gazebo_ros_diff_drive", "gazebo_ros_skid_steer_drive")
@@ -21,11 +21,13 @@ FRAME_TAGS = ("framename", "frameid", "childframeid")
 
 @rule("plugin-name", "error", "a misspelt plugin", "Gazebo does not find it")
 def _misspelt_plugins(subject: Subject) -> Iterator[Mistake]:
+    """Also one without `lib` or `.so`: Gazebo classic opens the file under that very name; gz-sim completes names."""
     for plugin in subject.plugins:
-        if suggestion := _meant(kind_of(plugin)):
-            yield Mistake(
-                plugin, f"there is no plugin {plugin.attributes['filename']!r}", f"write {file_name(suggestion)}"
-            )
+        kind, file = kind_of(plugin), file_of(plugin)
+        meant = _meant(kind) or kind
+        classic = kind in KNOWN and not kind.startswith(("gz", "ign")) and kind != OMNI
+        if meant != kind or (classic and file.rpartition("/")[2] != file_name(kind)):
+            yield Mistake(plugin, f"there is no plugin {file!r}", f"write {file_name(meant)}")
 
 
 @rule("plugin", "warning", "an unknown plugin", "it is ignored")
