@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 FAR = 1e6  # m
 PATIENCE = 3.0  # s to wait for a router and for a sim
+SUNK = 5e-3  # m; a robot that is less deep in the ground does not hop
 TURN = 6.2832  # rad; a larger angle was probably given in degrees
 PLUGINS = {"planar_move": "libgazebo_ros_planar_move.so", "omni": "libholozen_omni_drive.so"}
 ENDS = {"</robot>": "<gazebo>{}</gazebo></robot>", "</model>": "{}</model>"}
@@ -279,8 +280,14 @@ def _requested_pose(model: "RobotModel", place: Place) -> "Pose":
     own = Place(*model.pose.xyz, *model.pose.rpy)
     given = {part.name: getattr(place, part.name) for part in fields(Place)}
     x, y, z, roll, pitch, yaw = (getattr(own, name) if value is None else value for name, value in given.items())
+    stands = -lowest(model, (roll, pitch, yaw))
     if place.z is None and own.z == 0:
-        z = -lowest(model, (roll, pitch, yaw))
+        z = stands
+    elif place.z is not None and stands - z > SUNK and not model.static:
+        report(
+            f"holozen spawn: warning: at -z {z:g} it is {stands - z:.3f} m deep in the ground, which pushes it out; "
+            "without -z it stands on the ground"
+        )
     return Pose.of((x, y, z), from_rpy(roll, pitch, yaw))
 
 
@@ -335,6 +342,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     flags.add_robot_sources(parser)
     add("--strict", action="store_true", help="a missing or bad mesh is an error")
     add("-urdf", "-sdf", action="store_true", help=argparse.SUPPRESS)  # detected from the file
+    for flag in ("-param", "-topic", "-string", "-stdin"):
+        add(flag, action=flags.Instead, advice="give the robot's file: holozen spawn my_bot.urdf.xacro --name Fred")
 
 
 VERBS = by_name(

@@ -89,6 +89,7 @@ def test_a_wrong_word_is_reported_with_the_closest(run: Run) -> None:
         ("tf view_frames", "holozen tf: no verb 'view_frames'; `holozen view` draws the frames; see `holo"),
         ("interface package std_msgs", "holozen interface: no verb 'package'; write `holozen interface list`; "),
         ("spawn", "holozen spawn: give the FILE of a robot or object; "),
+        ("spawn -param robot_description", "holozen spawn: no flag '-param'; give the robot's file: holozen spawn "),
         ("completion tcsh", "holozen completion: argument shell: 'tcsh'; there are bash, zsh, fish; "),
     ]:
         code, out, err = run(*words.split())
