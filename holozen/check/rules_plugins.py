@@ -99,7 +99,8 @@ def _no_drive(subject: Subject) -> Iterator[Mistake]:
     problem = f"the robot has {len(wheels)} wheels but no drive plugin"
     if controls:
         problem += f"; not supported: {kind_of(controls[0]) or controls[0].name}"
-    fix = f"add <gazebo><plugin> with filename={file_name(SUGGESTED[1])!r}, or spawn it with --drive planar_move"
+    plugin = file_name(SUGGESTED[len(wheels) % 2 == 0])  # an odd number of wheels are omni wheels
+    fix = f"add <gazebo><plugin> with filename={plugin!r}, or spawn it with --drive planar_move"
     yield Mistake(controls[0] if controls else subject.root, problem, fix)
 
 
@@ -127,8 +128,10 @@ def _is_driven(subject: Subject) -> bool:
 
 
 def _meant(kind: str) -> str | None:
-    """The plugin that a kind is a misspelling of: letters differ, or its last word, such as `_drive`, is missing."""
-    if kind in KNOWN:
-        return None
-    longer = [name for name in DRIVES if kind.startswith("gazebo_ros_") and name.startswith(f"{kind}_")]
-    return nearest(kind, KNOWN, 6) or min(longer, key=len, default=None)
+    """The plugin that a kind is a misspelling of: letters differ, its last word, such as `_drive`, is missing, or there
+    is one too many, such as `_plugin`.
+    """
+    if kind in KNOWN or not kind.startswith("gazebo_ros_"):
+        return None if kind in KNOWN else nearest(kind, KNOWN, 6)
+    alike = [name for name in DRIVES if name.startswith(f"{kind}_") or kind == f"{name}_plugin"]
+    return nearest(kind, KNOWN, 6) or min(alike, key=len, default=None)
