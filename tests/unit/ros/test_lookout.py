@@ -27,9 +27,8 @@ def test_topics_that_only_a_robot_with_a_name_has_are_logged_with_its_own(
         made.create_subscription(find("rosgraph_msgs/msg/Clock"), "clock", print, 1)
         return made
 
-    nodes, lines = [node("ann", "Fred/"), node("tom", "")], list[str]()
-    wait_for(lambda: lines.extend(capfd.readouterr().err.splitlines()) or lines)
-    (line,) = lines
+    nodes = [node("ann", "Fred/"), node("tom", "")]
+    (line,) = wait_for(lambda: capfd.readouterr().err.splitlines())
     rules = "-r cmd_vel:=Fred/cmd_vel -r odom:=Fred/odom -r tf:=Fred/tf"
     what = "nothing reads cmd_vel, nothing publishes odom and tf; a robot with a name has its own"
     assert line.partition("[tom]: ")[2] == f"{what}: remap with --ros-args {rules}"
