@@ -87,7 +87,8 @@ class Parser(argparse.ArgumentParser):
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
             words = [str(choice) for choice in action.choices]
-            raise argparse.ArgumentError(action, f"{value!r}{suggest(value, words)}; there are {', '.join(words)}")
+            be = "is" if len(words) == 1 else "are"
+            raise argparse.ArgumentError(action, f"{value!r}{suggest(value, words)}; there {be} {', '.join(words)}")
 
 
 class Instead(argparse.Action):

@@ -59,12 +59,14 @@ class Waiting(NamedTuple):
 
 
 class Intake:
-    """Samples of several subscribers, in the order of arrival. Those that do not fit are dropped and counted.
+    """Samples of several subscribers on `wanted` keys, in the order of arrival. Those that do not fit are dropped and
+    counted.
 
     Use it in a `with` block inside that of the bus.
     """
 
-    def __init__(self, room: int = QUEUE) -> None:
+    def __init__(self, room: int = QUEUE, wanted: Callable[[str], bool] = lambda _key: True) -> None:
+        self.wanted = wanted
         self.received = self.dropped = 0
         self.deletions = 0  # samples that delete their key, and hold no message
         self.lost = 0  # samples that never arrived, by their sequence numbers
@@ -132,7 +134,7 @@ class Intake:
 
     def add_latched(self, sample: Sample) -> None:
         """Add the last message of a latched key, unless it arrived."""
-        if hash((sample.key, sample.payload)) not in self._latched:
+        if self.wanted(sample.key) and hash((sample.key, sample.payload)) not in self._latched:
             self.add(sample.key, sample.payload, sample.encoding)
 
     def _lost_before(self, sender: tuple[str, str], number: int) -> int:
@@ -174,6 +176,8 @@ class _Listener:
                 if in_a_row == DEPTH:
                     self.overran, in_a_row = self.overran + 1, 0
                 sample = waiting or self._wait()
+                if not self._intake.wanted(sample.key):
+                    continue
                 if sample.is_deletion:  # replayed, it would be an empty message
                     self._intake.deletions += 1
                 else:

@@ -24,7 +24,8 @@ _BLUE = '<material name="blue"><color rgba="0 0 1 1"/></material>\n'
 _MARK = '<visual><geometry><sphere radius="0.01"/></geometry><material name="blue"/></visual>'
 _TIP = '<xacro:macro name="{}" params="name"><link name="${{name}}"/></xacro:macro>\n'
 _BOX = (
-    '<link name="box"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>\n  <{0}><geometry>'
+    '<link name="box"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    "\n  <{0}><geometry>"
     '<box size="1 1 1"/></geometry></{0}></link>'
 )
 _TIP_BOX = '<link name="tip"><visual><geometry><box size="{}"/></geometry></visual></link>'
@@ -74,6 +75,7 @@ EXAMPLES = {
         '<mass value="2000"/><inertia ixx="9" ixy="0" ixz="0" iyy="17" iyz="0" izz="24"/>', _MASS + _MOMENTS
     ),
     "inertia": Example(_MOMENTS.replace('izz="0.024"', 'izz="0.24"'), _MOMENTS),
+    "inertia-part": Example(_MOMENTS.replace(' ixy="0" ixz="0"', "").replace(' iyz="0"', ""), _MOMENTS),
     "inertia-size": Example('<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>', _MOMENTS),
     "floating": Example(
         '<gazebo reference="base"><gravity>false</gravity></gazebo>',

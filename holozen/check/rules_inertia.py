@@ -134,6 +134,19 @@ def _impossible_inertia(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(given.inertia_tag, problem, COMPUTE, _computed(name, given, subject))
 
 
+@rule("inertia-part", "warning", "an <inertia> without its six values", "ROS and Gazebo do not load the robot")
+def _incomplete_inertia(subject: Subject) -> Iterator[Mistake]:
+    """Here omitted products are 0. Omitted moments, and misspelt attributes, are the mistakes of other rules."""
+    for name, given in _inertials(subject) if not subject.sdf else ():
+        tag = given.inertia_tag
+        if tag is None or _missing_moments(tag) or not set(tag.attributes) <= set(WORDS):
+            continue
+        if lost := [word for word in WORDS if tag.given(word) is None]:
+            zeros = [f'{word}="0"' for word in lost]
+            problem = f"the inertia of link {name!r} has no {' and no '.join(lost)}"
+            yield Mistake(tag, problem, f"write {' '.join(zeros)}")
+
+
 @rule("inertia-size", "warning", "an inertia 10 times larger or smaller than the shape's",
       "it turns too hard or too easily")  # fmt: skip
 def _unlike_shape(subject: Subject) -> Iterator[Mistake]:

@@ -86,13 +86,18 @@ def _circles(subject: Subject, roots: list[str]) -> Iterator[Mistake]:
         yield Mistake(subject.links[lost[0]], problem, "remove one of the joints")
 
 
-@rule("colour", "warning", "a material without a colour, or with two", "the colour is undefined")
+@rule("colour", "warning", "a material without a colour, with two, or without alpha", "the colour is undefined")
 def _colours(subject: Subject) -> Iterator[Mistake]:
-    """Only in URDF, and only materials with a name: nothing refers to others."""
+    """Only in URDF, and only materials with a name, but for alpha: nothing refers to others."""
     if subject.sdf:
         return
     given: dict[str, Tag] = {}
     for tag in _materials(subject):
+        for words in _colour(tag):
+            if len(words) == 3:
+                rgba = " ".join(words)
+                problem = f"the colour {rgba!r} has no alpha, so ROS shows it black"
+                yield Mistake(tag.child("color"), problem, f'write rgba="{rgba} 1"')
         name = tag.attributes.get("name", "").strip()
         if not name:
             continue

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from holozen.check.engine import Mistake, Subject, rule
 from holozen.check.spelling import nearest
 from holozen.robot.elements import Tag
-from holozen.robot.gazebo_plugins import DRIVES, KNOWN, MOVING_ELSEWHERE, file_name, file_of, kind_of
+from holozen.robot.gazebo_plugins import DRIVES, KNOWN, MOVING_ELSEWHERE, OMNI, file_name, file_of, kind_of
 from holozen.suggest import listed, suggest
 
 SUGGESTED = ("gazebo_ros_planar_move", "gazebo_ros_diff_drive", "gazebo_ros_skid_steer_drive")
@@ -21,11 +21,13 @@ FRAME_TAGS = ("framename", "frameid", "childframeid")
 
 @rule("plugin-name", "error", "a misspelt plugin", "Gazebo does not find it")
 def _misspelt_plugins(subject: Subject) -> Iterator[Mistake]:
+    """Also one without `lib` or `.so`: Gazebo classic opens the file under that very name; gz-sim completes names."""
     for plugin in subject.plugins:
-        if suggestion := _meant(kind_of(plugin)):
-            yield Mistake(
-                plugin, f"there is no plugin {plugin.attributes['filename']!r}", f"write {file_name(suggestion)}"
-            )
+        kind, file = kind_of(plugin), file_of(plugin)
+        meant = _meant(kind) or kind
+        classic = kind in KNOWN and not kind.startswith(("gz", "ign")) and kind != OMNI
+        if meant != kind or (classic and file.rpartition("/")[2] != file_name(kind)):
+            yield Mistake(plugin, f"there is no plugin {file!r}", f"write {file_name(meant)}")
 
 
 @rule("plugin", "warning", "an unknown plugin", "it is ignored")
@@ -97,7 +99,8 @@ def _no_drive(subject: Subject) -> Iterator[Mistake]:
     problem = f"the robot has {len(wheels)} wheels but no drive plugin"
     if controls:
         problem += f"; not supported: {kind_of(controls[0]) or controls[0].name}"
-    fix = f"add <gazebo><plugin> with filename={file_name(SUGGESTED[1])!r}, or spawn it with --drive planar_move"
+    plugin = file_name(SUGGESTED[len(wheels) % 2 == 0])  # an odd number of wheels are omni wheels
+    fix = f"add <gazebo><plugin> with filename={plugin!r}, or spawn it with --drive planar_move"
     yield Mistake(controls[0] if controls else subject.root, problem, fix)
 
 
@@ -125,8 +128,10 @@ def _is_driven(subject: Subject) -> bool:
 
 
 def _meant(kind: str) -> str | None:
-    """The plugin that a kind is a misspelling of: letters differ, or its last word, such as `_drive`, is missing."""
-    if kind in KNOWN:
-        return None
-    longer = [name for name in DRIVES if kind.startswith("gazebo_ros_") and name.startswith(f"{kind}_")]
-    return nearest(kind, KNOWN, 6) or min(longer, key=len, default=None)
+    """The plugin that a kind is a misspelling of: letters differ, its last word, such as `_drive`, is missing, or there
+    is one too many, such as `_plugin`.
+    """
+    if kind in KNOWN or not kind.startswith("gazebo_ros_"):
+        return None if kind in KNOWN else nearest(kind, KNOWN, 6)
+    alike = [name for name in DRIVES if name.startswith(f"{kind}_") or kind == f"{name}_plugin"]
+    return nearest(kind, KNOWN, 6) or min(alike, key=len, default=None)

@@ -11,7 +11,7 @@ from holozen.robot.errors import RobotError
 from holozen.robot.model import JOINT_KINDS
 from holozen.robot.sdf import IN_WORLD, NOT_SIMULATED
 from holozen.robot.sdf import KNOWN as KNOWN_IN_SDF
-from holozen.suggest import listed
+from holozen.suggest import cut, listed
 
 # The words of URDF, of its Gazebo elements, and of SDF.
 
@@ -127,6 +127,7 @@ SDF = frozenset(KNOWN_IN_SDF).union(IN_WORLD, NOT_SIMULATED, *(map(_set, KNOWN_I
 
 MAX_GUESSES = 500  # of different words
 FREE = ("gazebo", "transmission")  # may contain non-URDF elements
+SEVERAL = ("visual", "collision")  # a link may have more than one of each
 SDF_JOINT_KINDS = (*JOINT_KINDS, "revolute2", "universal", "ball", "screw", "gearbox")
 
 
@@ -181,17 +182,41 @@ def _misplaced(subject: Subject) -> Iterator[Mistake]:
                 yield Mistake(tag, f"<{tag.name}> does not belong in {parent}", f"move it into {owners}")
 
 
-@rule("ignored", "warning", "an element that URDF does not have", "URDF parsers ignore it")
+@rule("ignored", "warning", "an element that URDF does not have, or text", "URDF parsers ignore it")
 def _ignored(subject: Subject) -> Iterator[Mistake]:
-    """Except misspellings of elements that URDF has there."""
+    """Except misspellings of elements that URDF has there. Of elements that are there once the first counts."""
     spelt = {mistake.at for mistake in _misspelt_tags.find(subject)}
     for parent in _urdf_elements(subject):
         known = URDF[parent.name].children
+        if parent.name not in FREE and (text := parent.text.strip()):
+            yield Mistake(parent, f"the text {cut(text, 40)} in {parent} is not read", _as_attribute(parent))
+        for tag in _further(parent):
+            yield Mistake(tag, f"a second {_kind(tag)} in {parent} is not read", "remove one of them")
         for tag in parent.children if parent.name not in FREE else ():
             if tag.name in known or tag.name in MISPLACED or ":" in tag.name or tag in spelt:
                 continue
             fix = IGNORED.get(tag.name, f"remove it, or write one of {listed(sorted(known))}" if known else "remove it")
             yield Mistake(tag, f"<{tag.name}> in {parent} is not read", fix)
+
+
+def _as_attribute(tag: Tag) -> str:
+    """What to write in place of an element's text."""
+    words = [f'{word}="..."' for word in sorted(URDF[tag.name].attributes - {"quat_xyzw"})]
+    return f"write {' or '.join(words)}" if words and not URDF[tag.name].children else "remove it"
+
+
+def _further(parent: Tag) -> Iterator[Tag]:
+    """The children of an element of which it has one alone, but for the first."""
+    seen: set[str] = set()
+    for tag in parent.children if parent.name not in ("robot", *FREE) else ():
+        if tag.name in URDF[parent.name].children and tag.name not in SEVERAL:
+            if _kind(tag) in seen:
+                yield tag
+            seen.add(_kind(tag))
+
+
+def _kind(tag: Tag) -> str:
+    return "shape" if tag.parent and tag.parent.name == "geometry" else f"<{tag.name}>"
 
 
 @rule("joint-type", "error", "a joint type that does not exist", "the robot cannot be loaded")

@@ -23,7 +23,7 @@ def unknown(word: str, known: list[str], where: str) -> str:
     """The message that no node has a key; `known` are the keys at `where`."""
     if not known:
         return f"unknown key {word!r}: {no_nodes(where)}"
-    return f"unknown key {word!r}{suggest(word, known)}; known: {listed(known)}"
+    return f"unknown key {word!r}{_suggest(word, known)}; known: {listed(known)}"
 
 
 def suggest_key(bus: Node, keys: Iterable[str], kinds: tuple[str, ...] = ("pub", "sub")) -> str:
@@ -35,7 +35,13 @@ def suggest_key(bus: Node, keys: Iterable[str], kinds: tuple[str, ...] = ("pub",
         return f"; {no_nodes(bus.where)}"
     live = {end.key for end in ends if end.kind in kinds and not is_any(end) and "*" not in end.key}
     lost = [key for key in keys if key not in live and "*" not in key]
-    return suggest(lost[0], sorted(_near(lost[0], live))) if lost else ""
+    return _suggest(lost[0], sorted(_near(lost[0], live))) if lost else ""
+
+
+def _suggest(lost: str, known: Collection[str]) -> str:
+    """As `suggest`; a robot's key comes before any other that is alike: Rosie/tf for tf."""
+    named = [key for key in known if key.endswith(f"/{lost}")]
+    return suggest(min(named, default=lost), named or known)
 
 
 def _near(lost: str, live: Collection[str]) -> list[str]:

@@ -3,11 +3,12 @@
 import argparse
 import contextlib
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from holozen import flags
-from holozen.cli.verb import Verb, by_name
+from holozen.cli.verb import Verb, by_name, open_bus
 from holozen.console import Failure, report
 from holozen.robot.errors import RobotError
 from holozen.suggest import suggest
@@ -52,7 +53,7 @@ def _follow(args: argparse.Namespace, path: Path, description: "LaunchDescriptio
     suspend_children_too()
     with LaunchService(connection.from_arguments(args).arguments(), stop_event()) as service:
         context = service.context
-        context.allow_env = args.allow_env
+        context.allow_env, context.other_sim = args.allow_env, partial(_running_sim, args)
         context.scope.configurations.update(values)
         context.scope = context.scope.within(path)
         left = set(values)
@@ -60,6 +61,13 @@ def _follow(args: argparse.Namespace, path: Path, description: "LaunchDescriptio
         service.run([description])
         _report_unused(path, context.used, left, set())
     return 1 if service.failed else 0
+
+
+def _running_sim(args: argparse.Namespace) -> str:
+    from holozen.transport.graph import on_key
+
+    with open_bus(args) as bus:
+        return next((end.source for end in on_key(bus.endpoints(), "clock", "pub")), "")
 
 
 def _report_unused(path: Path, used: set[str], left: set[str], later: set[str]) -> None:
@@ -77,6 +85,7 @@ def _file(words: list[str], refuse: Callable[[str], NoReturn]) -> Path:
     """The launch file that the words name. Raises RobotError for a package, NotFound for its file."""
     from holozen.ros import packages
     from holozen.ros.executables import NotFound
+    from holozen.ros.launch.stand_ins import GAZEBO_LAUNCH_FILES
 
     if meant := flags.assigned(words[1:]):
         refuse(f"{meant.replace(':=', '=', 1)!r}: write {meant}")
@@ -86,12 +95,13 @@ def _file(words: list[str], refuse: Callable[[str], NoReturn]) -> Path:
         refuse(f"give FILE, or PACKAGE FILE, not {' '.join(words) or 'nothing'!r}")
     package, name = words[0], "".join(words[1:])
     folder = packages.find(package)
-    if folder == packages.stand_ins.get(package):
+    replaced = folder == packages.stand_ins.get(package)
+    if replaced and name:
         return folder / "launch" / name
     files = sorted(file for file in (folder / "launch").rglob("*") if file.is_file()) if folder.is_dir() else []
     found = next((file for file in files if file.name == name), None)
     if found is None:
-        names = [file.name for file in files if file.suffix == ".py"]
+        names = [*GAZEBO_LAUNCH_FILES[package]] if replaced else [file.name for file in files if file.suffix == ".py"]
         if not name:
             raise NotFound(f"{package} is a package; give one of its launch files too: {', '.join(names) or 'none'}")
         hint = suggest(name, names) or f"; there are {', '.join(names) or 'none'}"

@@ -3,15 +3,16 @@
 import argparse
 import errno
 import json
+import re
 import threading
 import time
 from collections.abc import Callable
-from functools import partial
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING
 
 from holozen.cli.verb import Verb, by_name
 from holozen.console import Failure, Line, printable, report
-from holozen.flags import key, number
+from holozen.flags import Instead, key, number, refused
 from holozen.process import stop_event
 from holozen.transport import connection
 
@@ -31,8 +32,10 @@ REPORT_EVERY = {True: 0.5, False: 5.0}  # s between two lines, in a terminal and
 def run(args: argparse.Namespace) -> int:
     """Record until Ctrl-C, or until --max-duration has passed."""
     args.keys += args.topics
-    if bool(args.keys) == args.all:
-        args.error("give keys or -a, not both" if args.all else "name the keys to record, or use -a for all")
+    given = [bool(args.keys), args.all, args.regex is not None]
+    if sum(given) != 1:
+        several = "give keys, -a or -e, only one of them"
+        args.error(several if any(given) else "name the keys to record, or use -a for all, -e for those that match")
     from holozen.bag.writer import BagWriter, RosBagWriter
 
     name = args.output or time.strftime("holozen_%Y_%m_%d-%H_%M_%S")
@@ -64,14 +67,16 @@ def _record(args: argparse.Namespace, writer: "BagWriter", stop: threading.Event
 
     failed = ""
     try:
-        with Bus("record", connection.from_arguments(args), stop=stop) as bus, Intake() as intake:
+        wanted = lru_cache(partial(_is_wanted, args))
+        with Bus("record", connection.from_arguments(args), stop=stop) as bus, Intake(wanted=wanted) as intake:
             for expression in _expressions(args):
                 subscriber = bus.subscribe_raw(expression, DEPTH)
                 subscriber.ends.append(bus.announce("sub", "any/msg/Any", expression))
                 intake.listen(subscriber)
-            report(
-                f"recording {'every key' if args.all else ' '.join(args.keys)} into {writer.files[0]}; Ctrl-C ends it"
-            )
+            what = f"the keys that match {args.regex.pattern!r}" if args.regex else " ".join(args.keys) or "every key"
+            left_out = ([repr(args.exclude.pattern)] if args.exclude else []) + args.exclude_topics
+            what += f" except {' '.join(left_out)}" if left_out else ""
+            report(f"recording {what} into {writer.files[0]}; Ctrl-C ends it")
             sim_time = SimTime() if args.use_sim_time else None
             graph, latched = bus.graph(), Latched(bus, intake, _expressions(args))
             latched.take(bus.endpoints())
@@ -133,8 +138,33 @@ def _expressions(args: argparse.Namespace) -> list[str]:
     """The key expressions to subscribe to; those included in another are dropped, so that nothing is recorded twice."""
     from holozen.transport.graph import includes
 
-    different = list(dict.fromkeys(["**"] if args.all else [*args.keys, *(["clock"] if args.use_sim_time else [])]))
+    different = list(dict.fromkeys([*args.keys, *(["clock"] if args.use_sim_time else [])] if args.keys else ["**"]))
     return [one for one in different if not any(other != one and includes(other, one) for other in different)]
+
+
+def _is_wanted(args: argparse.Namespace, name: str) -> bool:
+    """Whether -e, -x and --exclude-topics leave a key in."""
+    from holozen.transport.graph import includes
+
+    if args.use_sim_time and name == "clock":
+        return True
+    return (
+        (args.regex is None or _matches(args.regex, name))
+        and not (args.exclude and _matches(args.exclude, name))
+        and not any(includes(one, name) for one in args.exclude_topics)
+    )
+
+
+def _matches(regex: "re.Pattern[str]", name: str) -> bool:
+    """Whether a key matches as it is, or as the topic of ROS, which begins with a slash."""
+    return bool(regex.search(name) or regex.search(f"/{name}"))
+
+
+def _regex(text: str) -> "re.Pattern[str]":
+    try:
+        return re.compile(text)
+    except re.error as error:
+        raise refused(f"{text!r} is not a regular expression: {error}; write one such as 'odom|tf'") from None
 
 
 class Progress:
@@ -225,11 +255,18 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("keys", nargs="*", type=key, metavar="KEY", help="a key or key expression, such as */odom")
     add("--topics", nargs="+", type=key, default=[], metavar="KEY", help="more of them, as for ros2 bag record")
-    add("-a", "--all", action="store_true", help="every key")
+    add("-a", "--all", "--all-topics", action="store_true", help="every key")
+    add("-e", "--regex", type=_regex, metavar="REGEX", help="the keys in which this regular expression matches")
+    add("-x", "--exclude-regex", "--exclude", dest="exclude", type=_regex, metavar="REGEX",
+        help="leave out the keys in which it matches")  # fmt: skip
+    add("--exclude-topics", nargs="+", type=key, default=[], metavar="KEY", help="leave out these")
     add("-o", "--output", metavar="NAME", help="write NAME.mcap (default: holozen_DATE-TIME.mcap)")
     add("--max-size", type=number(0.1, 1e6, "MB"), metavar="MB",
         help="start a new file when one has this size: NAME_0.mcap, NAME_1.mcap, ...")  # fmt: skip
     add("--max-duration", type=number(0.1, 1e9, "s"), metavar="S", help="stop after S seconds")
+    split = "--max-size MB starts a new file at that size, --max-duration S ends the recording"
+    for name in ("-b", "--max-bag-size", "-d", "--max-bag-duration"):
+        add(name, action=Instead, advice=split)
     add("--use-sim-time", action="store_true", help="use the times of the sim's clock, which are those of the stamps")
     add("--ros2", action="store_true", help="write the folder NAME as `ros2 bag record` does, for `ros2 bag play`")
 

@@ -1,13 +1,14 @@
 """`holozen run`: run a Python script that was written for ROS 2, without ROS."""
 
 import argparse
+import re
 from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from holozen import flags
 from holozen.cli.verb import Verb, by_name
-from holozen.console import Failure
+from holozen.console import Failure, report
 from holozen.transport import connection
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ def run(args: argparse.Namespace) -> int:
     source = script.path.read_text(errors="replace")
     words, found = _split(words, [flag for flag in _BEHIND if flag not in source], sure=("--package",))
     args = VERBS["run"].parser().parse_args([*found, args.target], args)
+    _report_lost(words, source)
     from holozen.ros import importer
     from holozen.ros.rclpy import context
 
@@ -53,6 +55,14 @@ def _split(words: list[str], flags: list[str], sure: Collection[str] = ()) -> tu
     return [*kept, *waiting], found
 
 
+def _report_lost(words: list[str], source: str) -> None:
+    """Report a word NAME:=VALUE that the script gets as its own, unless it speaks of such words."""
+    own = words[: words.index("--ros-args")] if "--ros-args" in words else words
+    if (lost := next((word for word in own if _ASSIGNMENT.match(word)), "")) and ":=" not in source:
+        how = f"for ROS write --ros-args -p {lost} for a parameter, or -r {lost} for a remap"
+        report(f"holozen run: {lost!r} is an argument of the script; {how}")
+
+
 def _is_valid(flag: str, value: str) -> bool:
     try:
         return bool(_BEHIND[flag](value))
@@ -60,6 +70,7 @@ def _is_valid(flag: str, value: str) -> bool:
         return False
 
 
+_ASSIGNMENT = re.compile(r"[\w/~.:]+:=")
 _BEHIND: dict[str, Callable[[str], object]] = {
     "--package": flags.package,
     "--connect": connection.endpoint,
@@ -75,13 +86,14 @@ def _script(target: str, words: list[str], given: dict[str, Path]) -> "tuple[Scr
     from holozen.ros import executables, packages
 
     path = Path(target).expanduser()
-    if path.is_file() or path.suffix == ".py" or "/" in target:
+    name = "" if words[:1] and words[0].startswith("-") else "".join(words[:1])
+    without_py = not name and path.with_name(f"{path.name}.py").is_file()
+    if path.is_file() or path.suffix or "/" in target or without_py:
         packages.use(given, path.absolute().parent)
         script = executables.from_file(path)
         packages.use(given, script.root)
         return script, words
     packages.use(given)
-    name = "" if words[:1] and words[0].startswith("-") else "".join(words[:1])
     try:
         script = executables.find(target, name)
     except executables.PackageNotFound:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 FAR = 1e6  # m
 PATIENCE = 3.0  # s to wait for a router and for a sim
+SUNK = 5e-3  # m; a robot that is less deep in the ground does not hop
 TURN = 6.2832  # rad; a larger angle was probably given in degrees
 PLUGINS = {"planar_move": "libgazebo_ros_planar_move.so", "omni": "libholozen_omni_drive.so"}
 ENDS = {"</robot>": "<gazebo>{}</gazebo></robot>", "</model>": "{}</model>"}
@@ -235,6 +236,8 @@ def put(
     for warning in warnings:
         if _complaint(warning) not in known:
             report(f"holozen spawn: warning: the sim: {warning}")
+    if place.z is not None:
+        _warn_if_sunk(candidate.model, pose)
     return _spawned(name, candidate, pose)
 
 
@@ -280,6 +283,20 @@ def _requested_pose(model: "RobotModel", place: Place) -> "Pose":
     if place.z is None and z == 0:
         z = -lowest(model, (roll, pitch, yaw))
     return Pose.of((x, y, z), from_rpy(roll, pitch, yaw))
+
+
+def _warn_if_sunk(model: "RobotModel", pose: "Pose") -> None:
+    """Report a robot that was spawned in the ground, which the sim allows while its root frame is on it."""
+    from holozen.robot.rigid import lowest
+    from holozen.rotation import Transform, to_rpy
+
+    at = Transform.of(pose.position, pose.orientation)
+    depth = -lowest(model, to_rpy(at.rotation)) - pose.position.z
+    if depth > SUNK and not model.static:
+        report(
+            f"holozen spawn: warning: at -z {pose.position.z:g} it is {depth:.3f} m deep in the ground, which pushes "
+            "it out; without -z it stands on the ground"
+        )
 
 
 def _inherited_pose(model: "RobotModel", old: "Pose") -> "Pose":
@@ -333,6 +350,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     flags.add_robot_sources(parser)
     add("--strict", action="store_true", help="a missing or bad mesh is an error")
     add("-urdf", "-sdf", action="store_true", help=argparse.SUPPRESS)  # detected from the file
+    for flag in ("-param", "-topic", "-string", "-stdin"):
+        add(flag, action=flags.Instead, advice="give the robot's file: holozen spawn my_bot.urdf.xacro --name Fred")
 
 
 VERBS = by_name(

@@ -30,6 +30,7 @@ _QOS = (
     "--qos-profile NAME", "--qos-depth N", "--qos-history NAME", "--qos-reliability NAME", "--qos-durability NAME",
     "--qos-liveliness NAME", "--qos-liveliness-lease-duration-seconds S",
 )  # fmt: skip
+_WRITTEN, _READ = ("-s mcap", "--storage mcap"), ("-s FORMAT", "--storage FORMAT")
 _NODES, _TOPICS, _SERVICES = "--include-hidden-nodes", "--include-hidden-topics", "--include-hidden-services"
 _ROS2 = {
     "topic find": (_TOPICS,), "topic type": (_TOPICS,), "topic info": (_TOPICS,),
@@ -40,7 +41,8 @@ _ROS2 = {
     "launch": ("-n", "--noninteractive", "-d", "--debug", "-a", "--show-all-subprocesses-output"),
     "node list": ("-a", "--all"), "node info": ("--include-hidden",), "param list": (_NODES,), "param get": (_NODES,),
     "param set": (_NODES,), "param describe": (_NODES,), "param dump": (_NODES,), "param load": (_NODES,),
-    "xacro": ("--inorder",), "doctor": ("-r", "--report", "--include-warnings"),
+    "xacro": ("--inorder",), "doctor": ("-r", "--report", "--include-warnings"), "record": _WRITTEN,
+    "bag record": _WRITTEN, "replay": _READ, "bag play": _READ, "bag info": _READ,
 }  # fmt: skip
 
 ELSEWHERE = {
@@ -59,6 +61,7 @@ _POLICIES = {
     "durability": DURABILITIES,
     "liveliness": ("system_default", "automatic", "manual_by_topic", "unknown", "best_available"),
 }  # fmt: skip
+_FORMATS = {"mcap": ("mcap",), "FORMAT": ("mcap", "sqlite3")}
 _VALUES: dict[str, Callable[[str], object]] = {"S": number(0, 1e9, "s"), "N": count()}
 
 _TYPE = re.compile(r"\w+/((msg|srv|action)/)?\w+")
@@ -228,7 +231,7 @@ def _add_ros2_flags(parser: argparse.ArgumentParser, flags: Iterable[str]) -> No
     for flag in flags:
         option, _, value = flag.partition(" ")
         if value:
-            choices = _POLICIES.get(option.removeprefix("--qos-"))
+            choices = _POLICIES.get(option.removeprefix("--qos-")) or _FORMATS.get(value)
             group.add_argument(option, metavar=value, type=_VALUES.get(value, str), choices=choices)
         else:
             group.add_argument(option, action="store_true")

@@ -43,6 +43,9 @@ _LINE = re.compile(
     rf"(?P<type>{_WORD}(?:/{_WORD}){{0,2}})(?:<=(?P<longest>\d{{1,10}}))?(?P<array>\[(?:<=)?\d{{0,10}}\])?"
     rf"\s+(?P<name>{_WORD})(?:\s*=\s*(?P<constant>\S.*)|\s+(?P<default>\S.*))?"
 )
+_FIELD_NAME = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
+_CONSTANT_NAME = re.compile(r"[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*")
+_HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 _ITEM = re.compile(r"""\s*("(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'|[^,"']+?)\s*(?:,|$)""")
 _BOOLS = {"true": True, "1": True, "false": False, "0": False}
 _SIZES = {"bool": 1, "byte": 1, "string": 4, "wstring": 4} | {
@@ -183,10 +186,11 @@ class Section(NamedTuple):
 Resolve = Callable[[str], Interface]
 
 
-def parse(text: str, where: str, resolve: Resolve, first: int = 1) -> list[Section]:
+def parse(text: str, where: str, resolve: Resolve, first: int = 1, strict: bool = False) -> list[Section]:
     """The sections of a file, separated by `---`. `resolve` returns the message for a name such as `Pose`.
 
-    Raises InterfaceError with `where` and the line, counted from `first`.
+    Raises InterfaceError with `where` and the line, counted from `first`; if `strict`, also for the names of fields
+    and constants that ROS 2 refuses, and ROS 1 does not.
     """
     if len(text) > LARGEST_FILE:
         raise InterfaceError(f"{where}: {len(text)} characters; at most {LARGEST_FILE} are read")
@@ -198,6 +202,8 @@ def parse(text: str, where: str, resolve: Resolve, first: int = 1) -> list[Secti
         elif bare:
             try:
                 sections[-1].append(_member(bare, resolve, sections[-1]))
+                if strict:
+                    _check_name(sections[-1][-1])
             except PlacedError:
                 raise  # it names the file of the nested type
             except InterfaceError as error:
@@ -227,8 +233,13 @@ def _bare(line: str) -> str:
 def _member(line: str, resolve: Resolve, before: list[Field | Constant]) -> Field | Constant:
     found = _LINE.fullmatch(line)
     if not found:
-        raise InterfaceError(f"{line[:80]!r} is not a field; write TYPE NAME, TYPE NAME DEFAULT or TYPE NAME=VALUE")
+        if not line.strip("-"):
+            raise InterfaceError(f"{line[:80]!r} is not a field; the line between two parts is ---")
+        forms = "TYPE NAME, TYPE NAME DEFAULT, TYPE NAME=VALUE, or # COMMENT; an array is TYPE[] NAME"
+        raise InterfaceError(f"{line[:80]!r} is not a field; write {forms}")
     name = found["name"]
+    if name in PRIMITIVES and found["type"] not in PRIMITIVES:
+        raise InterfaceError(f"{line[:80]!r} is not a field; the type comes first: {name} {found['type']}")
     if any(member.name == name for member in before):
         raise InterfaceError(f"{name!r} is defined twice")
     field = _field(found, resolve)
@@ -237,6 +248,18 @@ def _member(line: str, resolve: Resolve, before: list[Field | Constant]) -> Fiel
     if field.array or field.nested:
         raise InterfaceError(f"{name!r}: a constant is one number, bool or string")
     return Constant(name, field.type, value_of(field, found["constant"]))
+
+
+def _check_name(member: Field | Constant) -> None:
+    """Raise InterfaceError for a name that ROS 2 refuses."""
+    words = _HUMP.sub("_", member.name).split("_")
+    right = "_".join(filter(None, words)).lower()
+    if isinstance(member, Field) and not _FIELD_NAME.fullmatch(member.name):
+        rule = "ROS 2 allows lower-case letters, digits, and single underscores between them"
+        raise InterfaceError(f"{member.name!r} is not a valid name of a field; {rule}: {right}")
+    if isinstance(member, Constant) and not _CONSTANT_NAME.fullmatch(member.name):
+        default = f", or for a field with a default {member.type} {member.name} {member.value}"
+        raise InterfaceError(f"{member.name!r} is not a valid name of a constant; write {right.upper()}{default}")
 
 
 def _field(found: re.Match[str], resolve: Resolve) -> Field:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from holozen.messages.definitions import (
     ACTION_PARTS,
     LARGEST_FILE,
+    PRIMITIVES,
     Interface,
     InterfaceError,
     action_parts,
@@ -35,11 +36,12 @@ Paths = Sequence["str | os.PathLike[str]"]
 
 
 class Source(NamedTuple):
-    """The text of a definition, its file, and its first line."""
+    """The text of a definition, its file, and its first line; `strict` if its names have to be those of ROS 2."""
 
     text: str
     where: str
     line: int = 1
+    strict: bool = False
 
 
 def table(package: str) -> dict[str, Source]:
@@ -181,7 +183,7 @@ def _read(path: str) -> Source | None:
         if not stat.S_ISREG(state.st_mode):
             raise InterfaceError(f"{path} is not a file")
         with open(path, encoding="utf-8-sig") as file:
-            return Source(file.read(LARGEST_FILE + 1), path)
+            return Source(file.read(LARGEST_FILE + 1), path, strict=True)
     except FileNotFoundError:
         return None
     except UnicodeDecodeError:
@@ -272,10 +274,14 @@ class Registry:
             raise InterfaceError(f"{self._open[0]} is nested more than {DEEPEST} deep")
         self._open.append(full)
         try:
-            sections = parse(source.text, source.where, lambda other: self._nested(package, other), source.line)
+            if source.strict:
+                _check_file(source.where, name.rpartition("/")[2])
+            resolve = functools.partial(self._nested, package, source.strict)
+            sections = parse(source.text, source.where, resolve, source.line, source.strict)
             wanted = _SECTIONS[kind]
             if len(sections) != wanted:
-                raise InterfaceError(f"{source.where}: {len(sections) - 1} lines of '---'; a .{kind} has {wanted - 1}")
+                parts = "1 part" if len(sections) == 1 else f"{len(sections)} parts"
+                raise InterfaceError(f"{source.where}: '---' makes {parts}; a .{kind} has {wanted}")
             if kind == "action":
                 made = action_parts(full, sections, self.find)
             else:
@@ -288,10 +294,12 @@ class Registry:
         made += [half for service in made if kind == "action" and service.kind == "srv" for half in service.parts]
         self._found.update({interface.name: interface for interface in made})
 
-    def _nested(self, package: str, name: str) -> Interface:
+    def _nested(self, package: str, strict: bool, name: str) -> Interface:
         """The message that a file of `package` calls `name`."""
         if "/" in name:
             home, kind, last = _parts(name)
+            if strict and kind == "msg":
+                raise InterfaceError(f"{name!r} has a 'msg' that ROS 2 refuses in a file; write {home}/{last}")
             if kind == "srv" or (kind == "action" and _file(f"action/{last}") == f"action/{last}"):
                 what = "a service" if kind == "srv" else "an action"
                 raise InterfaceError(f"{name}: a field is a message, not {what}")
@@ -312,9 +320,26 @@ class Registry:
             there = self.places.packages()
             hint = suggest(package, there) or f"; known: {listed(there, MAX_SHOWN)}"
             return f"no package {package!r} with interfaces{hint}; give its folder: --package {package}=DIR"
-        if near := OTHER_WORDS.get(last_part(name)):
+        last = last_part(name)
+        if near := OTHER_WORDS.get(last, last.lower() if last.lower() in PRIMITIVES else ""):
             return f"no type {name!r}; write {near}"
+        if self._open:  # a file names messages only, without their kind
+            name, known = _short(name), [*map(_short, known), *PRIMITIVES]
+            if elsewhere := [_short(full) for full in self.names() if full.endswith(f"/msg/{last}")]:
+                return f"no type {name!r}; write {' or '.join(elsewhere)}"
         return f"no type {name!r}{suggest(name, known, last_part) or '; known: ' + listed(known, MAX_SHOWN)}"
+
+
+def _check_file(where: str, name: str) -> None:
+    """Raise InterfaceError for the name of a definition that ROS 2 refuses."""
+    if not re.fullmatch("[A-Z][A-Za-z0-9]*", name):
+        right = "".join(word[:1].upper() + word[1:] for word in name.split("_"))
+        rule = "ROS 2 allows letters and digits, the first an upper-case letter"
+        raise InterfaceError(f"{where}: {name!r} is not a valid name of a type; {rule}: {right}")
+
+
+def _short(name: str) -> str:
+    return name.replace("/msg/", "/")
 
 
 def _file(name: str) -> str:

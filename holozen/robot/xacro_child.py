@@ -225,18 +225,23 @@ class Trace:
                 return function(text, *tables)
             except NameError as error:
                 if error.name and tables and not hasattr(error, "hint"):
-                    near = _in_plain_macro(self._element) or suggest(error.name, names(tables[0]))
+                    plain = _in_plain_macro(self._element) or _plain_property(self._element, error.name)
+                    near = plain or suggest(error.name, names(tables[0]))
                     error.hint = near  # type: ignore[attr-defined]
                 raise
             except TypeError as error:
                 if tables and not hasattr(error, "hint"):
-                    error.hint = _no_number(text, tables[0])  # type: ignore[attr-defined]
+                    power = "; write ** for a power" if "^" in text else ""
+                    error.hint = _no_number(text, tables[0]) or power  # type: ignore[attr-defined]
                 raise
 
         return wrapped
 
 
 PLAIN_MACRO = "; <macro> lacks its prefix: write <xacro:macro ...> ... </xacro:macro>"
+PLAIN_PROPERTY = "; <property> lacks its prefix: write <xacro:property ...>"
+_NO_COMMAND = re.compile(r"Unknown substitution command \[(.+?)\]")
+COMMANDS = ("find", "env", "optenv", "dirname", "arg")
 
 
 def _plain_macros(document: Any) -> Any:
@@ -248,6 +253,13 @@ def _in_plain_macro(node: Any) -> str:
     while node is not None and node.nodeName != "macro":
         node = node.parentNode
     return PLAIN_MACRO if node is not None else ""
+
+
+def _plain_property(node: Any, name: str) -> str:
+    """A hint for a name that a `<property>` without prefix gives, which defines none."""
+    document = node.ownerDocument if node is not None else None
+    found = document.getElementsByTagName("property") if document else ()
+    return PLAIN_PROPERTY if any(each.getAttribute("name") == name for each in found) else ""
 
 
 def _no_number(expression: str, table: Any) -> str:
@@ -306,6 +318,8 @@ def describe(error: BaseException, trace: Trace, path: Path, guesses: Mapping[st
     hint = getattr(cause, "hint", "") or (_guessed(guesses) if isinstance(cause, OSError) else "")
     if type(cause).__name__ == "ArgException":
         hint = suggest(str(cause), list(args))
+    elif found := _NO_COMMAND.match(str(cause)):
+        hint = suggest(found[1].split()[0], COMMANDS) or f"; to calculate, write ${{{shorten(found[1], 80)}}}"
     return f"{_where(cause, trace)}: {_reason(cause, suffix)}{hint}{chain}"
 
 

@@ -478,6 +478,8 @@ def _remedy(field: Field, wanted: str, value: Any, place: str) -> str:
     """How to write it, where that is obvious."""
     if field.nested and hasattr(value, "to_msg"):
         return "; append .to_msg()"
+    if field.nested and isinstance(value, list | tuple) and len(value) == len(field.nested.fields):
+        return f"; write {wanted}({', '.join(f'{part.name}=...' for part in field.nested.fields)})"
     if field.nested or (field.array and not place):
         return ""
     if wanted == "float" and type(value) is int:

@@ -201,6 +201,9 @@ def unit_vector(data: Any, axis: int | None = None, out: Array | None = None) ->
 
 
 def _w_first(quaternion: Numbers) -> Array:
+    """Raises TypeError for a message."""
+    if hasattr(quaternion, "ROS"):
+        raise TypeError("a quaternion is a sequence here, not a message; write [q.x, q.y, q.z, q.w]")
     x, y, z, w = quaternion
     return np.array((w, x, y, z), dtype=float)
 

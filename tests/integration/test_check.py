@@ -15,7 +15,7 @@ TYPO = """<robot name="r">
 <inertial><mass value="1"/><inertia ixx="1" iyy="1" ivz="0" izz="1"/></inertial>
 <collision><geometry><sphere radius="1"/></geometry></collision></link></robot>"""
 WARNS = """<robot name="r">
-<link name="a"><inertial><mass value="1"/><inertia ixx="9" iyy="9" izz="9"/></inertial>
+<link name="a"><inertial><mass value="1"/><inertia ixx="9" iyy="9" izz="9" ixy="0" ixz="0" iyz="0"/></inertial>
 <collision><geometry><sphere radius="0.1"/></geometry></collision></link></robot>"""
 
 

@@ -221,6 +221,28 @@ def test_keys_that_include_each_other_are_recorded_once(wire: Wire, tmp_path: Pa
     assert [m.payload for m in read(tmp_path / "a.mcap")] == [b"once"]
 
 
+@pytest.mark.parametrize(
+    ("flags", "kept"),
+    [
+        (["-a", "-x", "^/a/|^c$", "-s", "mcap"], ["b/c", "end"]),
+        (["-e", "a/.|/b/|^end$", "--exclude-topics", "*/b"], ["b/c", "end"]),
+    ],
+)
+def test_regular_expressions_choose_keys_and_leave_some_out(
+    wire: Wire, tmp_path: Path, flags: list[str], kept: list[str]
+) -> None:
+    recorder = wire.start("record", *flags, "-o", str(tmp_path / "a"))
+    session = listening(wire, "end")
+    for key in ("a/b", "b/c", "c", "end"):
+        session.put(key, b"1")
+    session.delete("a/b")
+    wait_for(lambda: "end" in {m.channel.key for m in read(tmp_path / "a.mcap")})
+    recorder.signal(signal.SIGTERM)
+    assert recorder.wait() == 0
+    assert [m.channel.key for m in read(tmp_path / "a.mcap")] == kept
+    assert "deletions" not in recorder.out
+
+
 def test_for_ros_the_robot_is_recorded_in_cdr_by_the_sims_own_clock(town: Wire, robot: Robot, tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     words = ("odom", "tf", "-o", str(path), "--max-duration", "1", "--wire", "cdr", "--use-sim-time")

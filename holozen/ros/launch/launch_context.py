@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -92,6 +92,8 @@ class LaunchContext:
         self.allow_env: list[str] = []
         """The environment variables that xacro files may read."""
         self.simulates = False
+        self.other_sim: Callable[[], str] = lambda: ""
+        """Returns the source of a sim that runs already, or an empty text."""
 
     @property
     def runner(self) -> Runner:
@@ -208,8 +210,9 @@ def pairs(value: Any, what: str, place: str) -> list[tuple[Any, Any]]:
 
 
 def here() -> str:
-    """The file and line of the user's code that is being executed."""
+    """The file and line of the user's code that is being executed; empty where none is."""
     frame = sys._getframe()
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_OURS):
         frame = frame.f_back
-    return f"{frame.f_code.co_filename}:{frame.f_lineno}"
+    name = frame.f_code.co_filename
+    return "" if name.startswith("<frozen ") else f"{name}:{frame.f_lineno}"

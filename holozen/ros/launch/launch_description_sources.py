@@ -26,7 +26,7 @@ class PythonLaunchDescriptionSource:
         """The path and the description. Raises LaunchError, and what the file raises."""
         path = Path(text(context, self.path))
         try:
-            return path, gazebo_launch_file(path) or read(path)
+            return path, gazebo_launch_file(path, self.place) or read(path)
         except LaunchError as error:
             raise LaunchError.of(error, self.place) from None
 
@@ -39,10 +39,11 @@ def read(path: Path) -> LaunchDescription:
     """The description that a launch file generates. Raises LaunchError, and what the file raises."""
     if not path.is_file():
         raise LaunchError(missing(path, "*.launch.py", "launch files"))
-    if path.suffix in (".xml", ".yaml", ".yml"):
-        raise LaunchError(f"{path}: launch files in XML and YAML are not supported; Python only")
+    if path.suffix in (".xml", ".yaml", ".yml", ".launch"):
+        fix = f"write {path.name.partition('.')[0]}.launch.py, with a Node(package=..., executable=...) for each node"
+        raise LaunchError(f"{path}: launch files are in Python here; {fix}, or start its scripts by `holozen run`")
     if path.suffix != ".py":
-        raise LaunchError(f"{path}: only launch files in Python are supported, whose names end with .py")
+        raise LaunchError(f"{path}: not a launch file; the names of launch files end with .py here")
     try:
         source = path.read_bytes()
     except OSError as error:

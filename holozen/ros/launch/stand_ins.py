@@ -184,16 +184,22 @@ def replace_gazebo_packages() -> None:
     packages.stand_ins.update({name: NOWHERE / name for name in GAZEBO_LAUNCH_FILES})
 
 
-def gazebo_launch_file(path: Path) -> LaunchDescription | None:
-    """The replacement of one of Gazebo's launch files; None for any other file. Raises LaunchError."""
+def gazebo_launch_file(path: Path, place: str = "") -> LaunchDescription | None:
+    """The replacement of one of Gazebo's launch files, which is included at `place`; None for any other file.
+
+    Raises LaunchError.
+    """
     if path.parts[: len(NOWHERE.parts)] != NOWHERE.parts:
         return None
     package = path.parts[len(NOWHERE.parts)]
     known = GAZEBO_LAUNCH_FILES[package]
     if path.name not in known or path.parent.name != "launch":
-        hint = suggest(path.name, known) or f"; files: {', '.join(known)}"
-        raise LaunchError(f"{package} is replaced here, and has no {'/'.join(path.parts[3:])!r}{hint}")
-    return LaunchDescription([known[path.name]()])
+        instead = advice(package, path.name, ())
+        hint = f"; {instead}" if instead else suggest(path.name, known) or f"; there are {', '.join(known)}"
+        raise LaunchError(f"{package}, which holozen replaces, has no launch file {path.name!r}{hint}")
+    action = known[path.name]()
+    action.place = place
+    return LaunchDescription([action])
 
 
 class Simulation(Action):
@@ -202,12 +208,16 @@ class Simulation(Action):
     def __init__(self, world: Text = "", target: Action | None = None) -> None:
         super().__init__()
         self.world, self.target = world, target or self
+        self.place = self.target.place
 
     def execute(self, context: LaunchContext) -> Entities | None:
         """Start it. The launch ends when it does."""
         if context.simulates:
             return None
         context.simulates = True
+        if other := context.other_sim():  # what is spawned here would go there
+            fix = "end it, or leave Gazebo out of the launch file to use it"
+            raise LaunchError(f"{other} simulates here already; {fix}")
         world = text(context, self.world)
         ours = data.find("worlds", f"{Path(world).stem or 'empty'}.world")  # for the names of Gazebo's own
         if not Path(world).is_file() and ours.is_file():

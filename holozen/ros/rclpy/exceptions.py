@@ -21,6 +21,9 @@ class NotInitializedException(Exception):
     def __init__(self, *args: object) -> None:
         super().__init__("call rclpy.init() first; rclpy is not running, or was shut down", *args)
 
+    def __str__(self) -> str:
+        return "; ".join(map(str, self.args))
+
 
 class NoTypeSupportImportedException(Exception):
     """A type that is neither a message nor a service."""

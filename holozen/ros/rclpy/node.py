@@ -26,6 +26,7 @@ from holozen.ros.rclpy.exceptions import (
 from holozen.ros.rclpy.executors import Executor
 from holozen.ros.rclpy.handle import NamesAndTypes, NodeHandle, names_and_types
 from holozen.ros.rclpy.logging import RcutilsLogger
+from holozen.ros.rclpy.lookout import Lookout, is_of_robot
 from holozen.ros.rclpy.parameter import (
     PARAMETER_SEPARATOR_STRING,
     Callback,
@@ -95,6 +96,7 @@ class _State(NodeHandle):
         self._closing = threading.Lock()
         self._has_left = False
         self._calls: list[threading.Thread] = []
+        self._lookout: Lookout | None = None
         context.opened(self)
 
     def all(self, kind: type[T]) -> list[T]:
@@ -109,6 +111,8 @@ class _State(NodeHandle):
     def own(self, made: T) -> T:
         """Keep something until it, or the node, is destroyed."""
         self.owned.append(made)
+        if self._lookout is None and isinstance(made, Publisher | Subscription) and is_of_robot(made.topic):
+            self._lookout = Lookout(self)
         if self.executor is not None:
             self.executor.changed()
         return made
@@ -145,6 +149,9 @@ class _State(NodeHandle):
         self.is_closed = True
         owned, self.owned = self.owned, []
         self._calls += [thread for one in owned if isinstance(one, Client) for thread in one.threads()]
+        if self._lookout is not None:
+            self._lookout.cancel()
+            self._calls.append(self._lookout.thread)
         for one in owned:
             one.detach()
 

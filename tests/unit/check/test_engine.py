@@ -95,7 +95,9 @@ def test_an_argument_that_nothing_asks_for_is_a_finding(findings: Findings, good
 
 def test_what_xacro_warns_of_is_a_finding(findings: Findings) -> None:
     text = HEAD + '<xacro:property name="z" valeu="2" value="1"/><link name="a${z}"><inertial><mass value="1"/>'
-    found = findings(text + f'<inertia ixx="1" iyy="1" izz="1"/></inertial>{BALL}</link></robot>', "r.xacro")
+    found = findings(
+        text + f'<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>{BALL}</link></robot>', "r.xacro"
+    )
     assert [finding.rule for finding in found] == ["load-note"]
     assert "valeu" in found[0].problem
 
@@ -199,7 +201,7 @@ def test_short_and_far_words_are_not_guessed_at() -> None:
 
 
 LONG = "x" * 300_000
-MASS = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+MASS = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
 
 
 def test_a_long_word_of_the_file_does_not_make_a_long_finding(tmp_path: Path) -> None:

@@ -13,10 +13,11 @@ from tests.unit.check.conftest import HERE, Findings
 
 Rules = Callable[..., list[str]]
 
-HEAVY = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+HEAVY = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
 ARM_LIMIT = '<limit lower="-1" upper="1" effort="5" velocity="2"/>'
 LEFT = '<parent link="base"/><child link="left_wheel"/><origin xyz="0.05 0.12 0"/><axis xyz="0 1 0"/>'
 RIGHT = '<parent link="base"/><child link="right_wheel"/><origin xyz="0.05 -0.12 0"/><axis xyz="0 1 0"/>'
+PRODUCTS = 'ixy="0" ixz="0" iyz="0"'
 BASE = '<mass value="2"/><inertia ixx="0.009" ixy="0" ixz="0" iyy="0.017" iyz="0" izz="0.024"/>'
 SECOND_PARENT = '<joint name="x" type="fixed"><parent link="ball"/><child link="arm"/></joint>'
 FRAME = "<robotBaseFrame>footprint</robotBaseFrame>"
@@ -57,6 +58,11 @@ BROKEN = [
     ("ignored", '<sphere radius="0.015"/></geometry>', '<sphere radius="0.015"/></geometry><surface/>', "<mu1>"),
     ("ignored", '<link name="arm">', '<link name="arm"><pose>0 0 1 0 0 0</pose>', "<origin"),
     ("ignored", ARM_LIMIT, ARM_LIMIT + '<joint_properties damping="1"/>', "<dynamics"),
+    ("ignored", '<sphere radius="0.015"/>', '<sphere radius="0.015">0.015</sphere>', "'0.015' in <sphere>"),
+    ("ignored", '<sphere radius="0.015"/>', '<sphere radius="0.015">0.015</sphere>', 'write radius="..."'),
+    ("ignored", '<sphere radius="0.015"/>', '<sphere radius="0.015"/><sphere radius="1"/>', "a second shape in"),
+    ("ignored", ARM_LIMIT, ARM_LIMIT + '<axis xyz="0 0 1"/>', "a second <axis> in <joint name='arm_joint'>"),
+    ("ignored", "</robot>", "--></robot>", "the text '-->' in <robot name='good'> is not read"),
     ("ignored", "</robot>", "<unheard_of/></robot>", "<unheard_of> in <robot name='good'> is not read"),
     ("ignored", '<link name="arm">', '<link name="arm"><foo>1</foo>', "collision, gravity, inertial, visual"),
     ("floating", '<link name="base">', '<link name="base"><gravity>false</gravity>', "link 'base'"),
@@ -68,6 +74,7 @@ BROKEN = [
     ("tree", '<parent link="footprint"/><child link="base"/>', '<parent link="ball"/><child link="base"/>', ""),
     ("colour", '<material name="orange"/>', '<material name="ornge"/>', "'orange'"),
     ("colour", '<material name="orange"/>', '<material name="orange"><color rgba="1 0 0 1"/></material>', "another"),
+    ("colour", "0.95 0.45 0.1 1", "0.95 0.45 0.1", "has no alpha, so ROS shows it black"),
     ("tag", "<robotBaseFrame>", "<robot_base_fram>x</robot_base_fram><robotBaseFrame>", "write <robot_base_frame>"),
     ("tag", "<mu1>1.0</mu1>", "<sensr/>", "write <sensor>"),
     ("tree", "</robot>", SECOND_PARENT + "</robot>", "two joints"),
@@ -87,19 +94,21 @@ BROKEN = [
     ("no-inertia", "<inertial>" + BASE + "</inertial>", "", "'base'"),
     ("massless", '<mass value="2"/>', '<mass value="0"/>', "0 kg"),
     ("massless", '<link name="footprint"/>', '<link name="footprint">' + FRAME_ONLY + "</link>", "only a frame"),
-    ("massless", BASE, '<mass value="2"/><inertia ixx="0" iyy="0" izz="0"/>', "is zero"),
+    ("massless", BASE, '<mass value="2"/><inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/>', "is zero"),
     ("mass", '<mass value="2"/>', '<mass value="-2"/>', "-2 kg"),
     ("mass", '<mass value="2"/>', "", "no <mass>"),
     ("attribute", '<mass value="2"/>', '<mass vlaue="2"/>', "write value="),
-    ("heavy", BASE, '<mass value="2000"/><inertia ixx="9" iyy="17" izz="24"/>', "2000 kg"),
+    ("heavy", BASE, '<mass value="2000"/><inertia ixx="9" iyy="17" izz="24" ixy="0" ixz="0" iyz="0"/>', "2000 kg"),
     ("inertia", 'ixx="0.009"', 'ixx="-0.009"', "not positive definite"),
     ("inertia", 'ixx="0.009" ', "", "has no ixx; omitted values are 0"),
     ("number", '<origin xyz="0 0 0.05"/>', '<origin xyz="0 0 abc"/>', "'abc' is not a finite number"),
     ("number", '<origin xyz="0 0 0.05"/>', '<origin xyz="0 0"/>', "write 3"),
     ("inertia", 'ixx="0.009" ixy="0"', 'ixx="0.009" ixy="0.02"', "not positive definite"),
     ("inertia", 'izz="0.024"', 'izz="0.029"', "sum of the other two"),
-    ("inertia-size", BASE, '<mass value="2"/><inertia ixx="1" iyy="1" izz="1"/>', "up to 1 kg m^2"),
-    ("inertia-size", BASE, '<mass value="2"/><inertia ixx="1e-5" iyy="1e-5" izz="1e-5"/>', "a solid body"),
+    ("inertia-part", 'iyy="0.017" iyz="0"', 'iyy="0.017"', "the inertia of link 'base' has no iyz"),
+    ("inertia-part", BASE, BASE.replace(' ixy="0" ixz="0"', "").replace(' iyz="0"', ""), f"write {PRODUCTS}"),
+    ("inertia-size", BASE, f'<mass value="2"/><inertia ixx="1" iyy="1" izz="1" {PRODUCTS}/>', "up to 1 kg m^2"),
+    ("inertia-size", BASE, f'<mass value="2"/><inertia ixx="1e-5" iyy="1e-5" izz="1e-5" {PRODUCTS}/>', "a solid body"),
     ("floating", "</robot>", '<gazebo reference="base"><gravity>0</gravity></gazebo></robot>', "gravity is off"),
     ("floating", "</robot>", '<gazebo reference="arm"><turnGravityOff>1</turnGravityOff></gazebo></robot>', "'arm'"),
     ("wheel-axis", LEFT, LEFT.replace("0 1 0", "1 0 0"), "turns about (1 0 0)"),
@@ -107,6 +116,8 @@ BROKEN = [
     ("wheel-height", '<sphere radius="0.015"/>', '<box size="0.26 0.02 0.05"/>', "the robot stands on"),
     ("plugin-name", "gazebo_ros_diff_drive", "gazebo_ros_dif_drive", "libgazebo_ros_diff_drive.so"),
     ("plugin-name", "gazebo_ros_diff_drive", "gazebo_ros_diff", "write libgazebo_ros_diff_drive.so"),
+    ("plugin-name", "ros_diff_drive.so", "ros_diff_drive_plugin.so", "write libgazebo_ros_diff_drive.so"),
+    ("plugin-name", "libgazebo_ros_diff_drive.so", "gazebo_ros_diff_drive", "write libgazebo_ros_diff_drive.so"),
     ("plugin", PLUGIN, '<plugin name="x" filename="libmy_magic.so"/>' + PLUGIN, "remove it, or correct its name"),
     ("plugin-link", FRAME, "<robotBaseFrame>chasis</robotBaseFrame>", "names no link"),
     ("plugin-joint", "<leftJoint>left_joint", "<leftJoint>left_jiont", "'left_joint'"),
@@ -119,10 +130,12 @@ BROKEN = [
 BLUE = '<material name="blue"><color rgba="0 0 1 1"/></material>'
 TRANSMISSION = '<transmission name="t"><type>x</type><joint name="left_joint"/><actuator name="a"/></transmission>'
 FORK = (
-    '<link name="fork"><inertial><mass value="0.1"/><inertia ixx="1e-5" iyy="1e-5" izz="1e-5"/></inertial></link>'
+    f'<link name="fork"><inertial><mass value="0.1"/><inertia ixx="1e-5" iyy="1e-5" izz="1e-5" {PRODUCTS}/></inertial>'
+    "</link>"
     '<joint name="fork_joint" type="continuous"><parent link="base"/><child link="fork"/>'
     '<axis xyz="0 0 1"/></joint>'
-    '<link name="front_wheel"><inertial><mass value="0.1"/><inertia ixx="1e-5" iyy="1e-5" izz="1e-5"/></inertial>'
+    '<link name="front_wheel"><inertial><mass value="0.1"/>'
+    f'<inertia ixx="1e-5" iyy="1e-5" izz="1e-5" {PRODUCTS}/></inertial>'
     '<collision><geometry><sphere radius="0.02"/></geometry></collision></link>'
     '<joint name="front_wheel_joint" type="continuous"><parent link="fork"/><child link="front_wheel"/>'
     '<origin xyz="0.1 0 0.3"/><axis xyz="0 1 0"/></joint>'
@@ -288,7 +301,9 @@ def test_a_wheel_without_collision_sinks(good: str, rules: Rules) -> None:
 
 
 def test_a_robot_heavier_than_steel_though_no_link_is(good: str, findings: Findings) -> None:
-    heavy = good.replace(BASE, '<mass value="149"/><inertia ixx="0.67" iyy="1.27" izz="1.79"/>', 1)
+    heavy = good.replace(
+        BASE, '<mass value="149"/><inertia ixx="0.67" iyy="1.27" izz="1.79" ixy="0" ixz="0" iyz="0"/>', 1
+    )
     assert findings(heavy) == []
     body, finger, rest = heavy.partition('<link name="finger">')
     (finding,) = findings(body + finger + rest.replace('<mass value="0.01"/>', '<mass value="100"/>', 1))
@@ -329,17 +344,20 @@ def test_a_finding_stands_at_its_line(good: str, findings: Findings) -> None:
 
 
 MOUNTED = """<robot name="r">
-  <link name="base"><inertial><mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01"/></inertial>
+  <link name="base"><inertial><mass value="2"/>
+    <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
     <collision><origin xyz="0 0 0.02"/><geometry><cylinder radius="0.1" length="0.05"/></geometry></collision></link>
   {wheels}
   <gazebo><plugin name="drive" filename="libgazebo_ros_planar_move.so"/></gazebo>
 </robot>"""
 MOUNT = """
-  <link name="wheel_mount{0}"><inertial><mass value="0.05"/><inertia ixx="2e-5" iyy="2e-5" izz="2e-5"/></inertial>
+  <link name="wheel_mount{0}"><inertial><mass value="0.05"/>
+    <inertia ixx="2e-5" iyy="2e-5" izz="2e-5" ixy="0" ixz="0" iyz="0"/></inertial>
     <collision><geometry><box size="0.03 0.03 0.03"/></geometry></collision></link>
   <joint name="drive{0}" type="continuous"><parent link="base"/><child link="wheel_mount{0}"/>
     <origin xyz="{1} {2} 0" rpy="0 0 {3}"/><axis xyz="1 0 0"/></joint>
-  <link name="rim{0}"><inertial><mass value="0.2"/><inertia ixx="2e-4" iyy="2e-4" izz="2e-4"/></inertial>
+  <link name="rim{0}"><inertial><mass value="0.2"/>
+    <inertia ixx="2e-4" iyy="2e-4" izz="2e-4" ixy="0" ixz="0" iyz="0"/></inertial>
     <collision><origin rpy="0 1.5708 0"/><geometry><cylinder radius="0.05" length="0.03"/></geometry></collision></link>
   <joint name="fix{0}" type="fixed"><parent link="wheel_mount{0}"/><child link="rim{0}"/></joint>"""
 

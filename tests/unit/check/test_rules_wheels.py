@@ -19,7 +19,8 @@ LOW = BODY.replace("0.02", "0")
 BALL = '<link name="ball">'
 PLANAR = '<plugin name="drive" filename="libgazebo_ros_planar_move.so">'
 SMOOTH = '<gazebo reference="base"><mu1>0.1</mu1><mu2>0.1</mu2></gazebo>'
-FOOT = '<link name="foot"><inertial><mass value="0.01"/><inertia ixx="1e-6" iyy="1e-6" izz="1e-6"/></inertial>'
+FOOT = '<link name="foot"><inertial><mass value="0.01"/>'
+FOOT += '<inertia ixx="1e-6" iyy="1e-6" izz="1e-6" ixy="0" ixz="0" iyz="0"/></inertial>'
 
 
 def foot(name: str, shape: str, x: float) -> str:
@@ -100,13 +101,15 @@ def test_on_two_balls_it_tips() -> None:
     assert degrees(atan(abs(ground.a))) == pytest.approx(20, abs=2)
 
 
-INERTIA = '<inertial><mass value="2"/><inertia ixx="0.01" iyy="0.02" izz="0.02"/></inertial>'
+INERTIA = '<inertial><mass value="2"/><inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial>'
 
 
 def robot(places: list[tuple[float, float]], width: float = 0.02) -> str:
     """A box of 0.4 x 0.2 x 0.1 m and wheels 5 cm in radius at these x and y, 3 cm below its middle."""
     parts = [f'<link name="base">{INERTIA}<collision><geometry><box size="0.4 0.2 0.1"/></geometry></collision></link>']
-    inertia = '<inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4"/></inertial>'
+    inertia = (
+        '<inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial>'
+    )
     for number, (x, y) in enumerate(places):
         shape = f'<origin rpy="{pi / 2} 0 0"/><geometry><cylinder radius="0.05" length="{width}"/></geometry>'
         parts.append(f'<link name="wheel{number}">{inertia}<collision>{shape}</collision></link>')

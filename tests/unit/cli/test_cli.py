@@ -45,6 +45,8 @@ def test_an_unknown_verb_gets_the_nearest_or_what_there_is_instead(capsys: pytes
         ("rviz2", "; `holozen view` shows robots in a browser"),
         ("pkg", "; `holozen new package` writes one; `--package NAME=DIR`"),
         ("control", "; the sim moves joints itself, by the key joint_command"),
+        ("spawn_model", "; write `holozen spawn`"),
+        ("build", "; nothing is built here: packages are read as they are"),
         ("tf2_echo", "; write `holozen tf echo SOURCE TARGET`"),
     ]:
         assert cli.main([word]) == 2

@@ -11,7 +11,7 @@ import zenoh
 
 from holozen.bus import Bus
 from holozen.cli import main
-from holozen.messages import NextGoalReply, NextGoalRequest, Odometry, Twist
+from holozen.messages import Clock, NextGoalReply, NextGoalRequest, Odometry, TFMessage, Twist
 from holozen.testing import Wire, wait_for
 from holozen.transport.errors import ServiceError
 from holozen.transport.pubsub import Publisher
@@ -162,6 +162,15 @@ def test_a_filter_of_a_missing_field_is_reported(sim: Bus, run: Run, filter: str
 def test_a_waiting_echo_suggests_the_closest_key(sim: Bus, wire: Wire) -> None:
     echo = wire.start("topic", "echo", "Fred/odomm")
     echo.wait_for_line("waiting for Fred/odomm; no messages yet (did you mean 'Fred/odom'?)")
+
+
+def test_an_echo_of_a_key_that_only_a_named_robot_has_names_that(wire: Wire, run: Run) -> None:
+    bus = wire.bus("sim")
+    bus.publisher("Fred/tf", TFMessage)
+    bus.publisher("clock", Clock)
+    expected = "holozen topic echo: no messages on tf within 0.1 s (did you mean 'Fred/tf'?)\n"
+    assert run("topic", "echo", "tf", "--timeout", "0.1") == (1, "", expected)
+    assert "unknown key 'tf' (did you mean 'Fred/tf'?); known: " in run("topic", "info", "tf")[2]
 
 
 def test_a_plot_of_a_key_that_no_node_has_names_the_nearest(sim: Bus, run: Run, wire: Wire) -> None:

@@ -53,6 +53,15 @@ def test_a_robot_is_sent_under_its_name_and_put_on_the_ground(sim: FakeSim, run:
     assert parse(text, Path("/elsewhere")).drive is not None and "${" not in text
 
 
+def test_a_height_that_is_in_the_ground_is_a_warning(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    hops = "holozen spawn: warning: at -z 0.1 it is 0.400 m deep in the ground, which pushes it out; without -z it "
+    assert run("spawn", ball(tmp_path), "-z", "0.1")[2] == f"{hops}stands on the ground\n"
+    for number, z in enumerate(["0.499", "0.6"]):
+        assert run("spawn", ball(tmp_path), "-z", z, "--name", f"ball{number}")[2] == ""
+    still = ball(tmp_path, name="wall", more="<gazebo><static>true</static></gazebo>")
+    assert run("spawn", still, "-z", "0")[2] == ""
+
+
 @pytest.mark.parametrize(("namespace", "key"), [("/", "cmd_vel"), ("lab", "lab/cmd_vel")])
 @pytest.mark.parametrize("flag", ["--namespace", "-robot_namespace"])
 def test_its_keys_may_be_elsewhere(sim: FakeSim, run: Run, flag: str, namespace: str, key: str) -> None:

@@ -78,11 +78,18 @@ def test_a_wrong_word_is_reported_with_the_closest(run: Run) -> None:
         ("topic echo x --flow-style", "holozen topic echo: no flag '--flow-style'; --json prints each message on one "),
         ("bag play x --clock 20", "holozen bag play: no flag '--clock'; a bag that has the key clock plays it: "),
         ("bag play x -p", "holozen bag play: --start-paused needs a terminal, in which space goes on; "),
-        ("bag record -a --topics odom", "holozen bag record: give keys or -a, not both; "),
-        ("record -a odom", "holozen record: give keys or -a, not both; "),
+        ("bag record -a --topics odom", "holozen bag record: give keys, -a or -e, only one of them; "),
+        ("bag record -s sqlite3 -a", "holozen bag record: argument -s: 'sqlite3'; there is mcap; "),
+        ("record -b 1000 -a", "holozen record: no flag '-b'; --max-size MB starts a new file at that size, "),
+        (
+            "record -e *odom",
+            "holozen record: argument -e/--regex: '*odom' is not a regular expression: nothing to repeat",
+        ),
+        ("record -a odom", "holozen record: give keys, -a or -e, only one of them; "),
         ("tf view_frames", "holozen tf: no verb 'view_frames'; `holozen view` draws the frames; see `holo"),
         ("interface package std_msgs", "holozen interface: no verb 'package'; write `holozen interface list`; "),
         ("spawn", "holozen spawn: give the FILE of a robot or object; "),
+        ("spawn -param robot_description", "holozen spawn: no flag '-param'; give the robot's file: holozen spawn "),
         ("completion tcsh", "holozen completion: argument shell: 'tcsh'; there are bash, zsh, fish; "),
     ]:
         code, out, err = run(*words.split())

@@ -87,7 +87,10 @@ def test_a_service_has_two_sections() -> None:
 
 def test_a_wrong_line_is_reported_with_file_and_line() -> None:
     for line, reason in [
-        ("float64", "'float64' is not a field; write TYPE NAME, TYPE NAME DEFAULT or TYPE NAME=VALUE"),
+        ("float64", "'float64' is not a field; write TYPE NAME, TYPE NAME DEFAULT, TYPE NAME=VALUE, or # COMMENT"),
+        ("float64 x[3]", "'float64 x[3]' is not a field; write"),
+        ("x float64", "'x float64' is not a field; the type comes first: float64 x"),
+        ("----", "'----' is not a field; the line between two parts is ---"),
         ("float64 2x", "'float64 2x' is not a field"),
         ("float64 x;", "is not a field"),
         ("float64[-1] x", "is not a field"),

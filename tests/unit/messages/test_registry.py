@@ -143,20 +143,41 @@ def test_an_error_names_some_of_many_types(lesson: Path) -> None:
 def test_a_wrong_line_of_a_nested_type_is_reported_with_its_place(lesson: Path) -> None:
     (lesson / "msg" / "Spot.msg").write_text("# a spot\nflot64 x\n")
     message = refusal(Registry({"lesson": lesson}), "lesson/msg/Where")
-    assert message.startswith(f"{lesson}/msg/Spot.msg:2: no type 'lesson/msg/flot64'")
+    assert message == f"{lesson}/msg/Spot.msg:2: no type 'lesson/flot64' (did you mean 'float64'?)"
     (lesson / "msg" / "Spot.msg").write_text("float x\n")
     message = refusal(Registry({"lesson": lesson}), "lesson/msg/Where")
     assert message.endswith("/msg/Spot.msg:1: no type 'lesson/msg/float'; write float32 or float64")
+
+
+def test_names_that_ros_refuses_are_reported_with_those_to_write(lesson: Path) -> None:
+    for file, text, reason in [
+        ("msg/Spot.msg", "float64 xGoal", "'xGoal' is not a valid name of a field; ROS 2 allows lower-case letters"),
+        ("msg/Spot.msg", "float64 x__goal_", "between them: x_goal"),
+        ("msg/Spot.msg", "float64 x = 3", "name of a constant; write X, or for a field with a default float64 x 3.0"),
+        ("msg/Spot.msg", "Twist command", "no type 'lesson/Twist'; write geometry_msgs/Twist"),
+        ("msg/Spot.msg", "Float64 x", "no type 'lesson/msg/Float64'; write float64"),
+        ("msg/Spot.msg", "geometry_msgs/msg/Twist t", "'msg' that ROS 2 refuses in a file; write geometry_msgs/Twist"),
+        ("srv/next_goal.srv", "---", "'next_goal' is not a valid name of a type; ROS 2 allows letters and digits"),
+        ("srv/next_goal.srv", "---", "upper-case letter: NextGoal"),
+    ]:
+        (lesson / file).write_text(text)
+        message = refusal(Registry({"lesson": lesson}), f"lesson/{file.partition('.')[0]}")
+        assert message.startswith(f"{lesson}/{file}") and reason in message
+
+
+def test_a_definition_from_elsewhere_may_have_names_of_ros_1() -> None:
+    text = "float64 xGoal\ngeometry_msgs/msg/Twist t\nint8 max=3"
+    assert [field.name for field in Registry().learn("old/msg/Goal", lambda _: text).fields] == ["xGoal", "t"]
 
 
 def test_what_is_no_definition_is_reported_with_its_file(lesson: Path) -> None:
     for file, text, reason in [
         ("msg/Spot.msg", "Spot other", "lesson/msg/Spot contains itself: lesson/msg/Spot > lesson/msg/Spot"),
         ("msg/Spot.msg", "Where other", "contains itself"),
-        ("msg/Spot.msg", "bool a\n---\nbool b", "1 lines of '---'; a .msg has 0"),
+        ("msg/Spot.msg", "bool a\n---\nbool b", "'---' makes 2 parts; a .msg has 1"),
         ("msg/Spot.msg", "std_srvs/srv/Trigger a", "a field is a message, not a service"),
         ("msg/Spot.msg", "uint8[1000000000] a", "is too large: at least 1000000000 bytes"),
-        ("srv/Spot.srv", "bool a", "0 lines of '---'; a .srv has 1"),
+        ("srv/Spot.srv", "bool a", "'---' makes 1 part; a .srv has 2"),
     ]:
         (lesson / file).write_text(text)
         assert reason in refusal(Registry({"lesson": lesson}), f"lesson/{file.partition('.')[0]}")
@@ -221,5 +242,5 @@ def test_an_action_file_has_three_sections_and_is_no_field(lesson: Path) -> None
     (lesson / "action" / "Turn.action").write_text("float64 angle\n---\n")
     (lesson / "msg" / "Bad.msg").write_text("example_interfaces/action/Fibonacci it\n")
     registry = Registry({"lesson": lesson})
-    assert "1 lines of '---'; a .action has 2" in refusal(registry, "lesson/action/Turn")
+    assert "'---' makes 2 parts; a .action has 3" in refusal(registry, "lesson/action/Turn")
     assert "a field is a message, not an action" in refusal(registry, "lesson/msg/Bad")

@@ -137,6 +137,8 @@ def test_an_element_that_does_not_fit_is_reported_with_its_place() -> None:
         ("geometry_msgs/Point[]", [VECTOR()], "[0]' field of t.msg.T must be a sub message of type 'Point', not 'Vec"),
     ]:
         assert refused(made(f"{kind} some")(), "some", values).startswith(f"The 'some{reason}")
+    message = refused(made("geometry_msgs/Quaternion some")(), "some", (0.0, 0.0, 0.0, 1.0))
+    assert message.endswith("; write Quaternion(x=..., y=..., z=..., w=...)")
 
 
 class Text(str):

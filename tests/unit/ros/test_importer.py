@@ -223,7 +223,7 @@ def test_a_definition_that_is_broken_is_reported_with_its_line(package: Path) ->
         assert refused(line).startswith(f"{file}:3: ")
     file.write_text("int64 a\n")
     importer.install({"my_pkg": package})
-    assert refused("from my_pkg.srv import Broken") == f"{file}: 0 lines of '---'; a .srv has 1"
+    assert refused("from my_pkg.srv import Broken") == f"{file}: '---' makes 1 part; a .srv has 2"
 
 
 def test_what_a_package_does_not_have_is_reported(package: Path) -> None:

@@ -167,6 +167,8 @@ def test_a_name_that_is_not_there_is_reported_in_the_users_traceback(run: Run, w
 
 def test_what_is_not_there_is_one_line(run: Run, write: Write, my_bot: Path) -> None:
     for words, message in [
+        (["controller"], "controller does not exist (did you mean 'controller.py'?)"),
+        (["controller.pyy"], "controller.pyy does not exist (did you mean 'controller.py'?)"),
         (["q.py"], "q.py does not exist; Python files in that folder: controller.py"),
         (["scripts/b.py"], "scripts/b.py does not exist, and there are no Python files in that folder"),
         (["my_boot", "a.py"], "no package 'my_boot' around "),
@@ -188,6 +190,18 @@ def test_a_flag_of_ours_behind_the_script_is_checked_unless_the_script_has_it(ru
         assert done.stderr.startswith(f"holozen run: argument --package: '{value}'")
     write("b.py", "import sys; print(sys.argv[1:])  # --package")
     assert run("b.py", "--package", "hb").stdout == "['--package', 'hb']\n"
+
+
+def test_a_parameter_among_the_scripts_own_words_is_reported(run: Run, write: Write) -> None:
+    write("a.py", "import sys; print(sys.argv[1:])")
+    write("b.py", "import sys; print(':=')")
+    done = run("a.py", "-p", "kp:=2.0")
+    assert done.stdout == "['-p', 'kp:=2.0']\n"
+    assert done.stderr.startswith(
+        "holozen run: 'kp:=2.0' is an argument of the script; for ROS write --ros-args -p kp:="
+    )
+    for words in (["a.py", "--ros-args", "-p", "kp:=2.0"], ["b.py", "kp:=2.0"], ["a.py", "kp=2"]):
+        assert run(*words).stderr == ""
 
 
 def test_a_module_that_is_not_here_is_reported_with_what_to_do(run: Run, write: Write) -> None:

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holozen.ros import tf_transformations as tft
+from holozen.ros.generated import find
 
 ANGLES = st.floats(-3.1, 3.1)
 HALF = math.sqrt(0.5)
@@ -131,6 +132,11 @@ def test_random_rotations_are_rotations():
     assert np.allclose(np.linalg.det(tft.random_rotation_matrix()[:3, :3]), 1)
     assert tft.random_vector(7).shape == (7,)
     assert np.allclose(tft.random_quaternion((0.0, 0.25, 0.0)), (1, 0, 0, 0))
+
+
+def test_a_message_is_no_quaternion():
+    with pytest.raises(TypeError, match=r"not a message; write \[q.x, q.y, q.z, q.w]"):
+        tft.euler_from_quaternion(find("geometry_msgs/msg/Quaternion")())
 
 
 def test_an_order_of_axes_that_there_is_not_is_an_error():

@@ -79,8 +79,8 @@ def generate_launch_description():
 def test_a_file_that_cannot_be_included_is_reported(follow: Follow, write: Write) -> None:
     for name, text, message in [
         ("c.launch.py", "", r"b.launch.py does not exist \(did you mean 'c.launch.py'"),
-        ("b.launch.xml", "<launch/>", "launch files in XML and YAML are not supported; Python only"),
-        ("b.launch.txt", "", "only launch files in Python are supported"),
+        ("b.launch.xml", "<launch/>", "launch files are in Python here; write b.launch.py, with a Node"),
+        ("b.launch.txt", "", "not a launch file; the names of launch files end with .py"),
         ("b.launch.py", "x = 1", "has no function generate_launch_description"),
         ("b.launch.py", "def generate_launch_description(): return 7", r"returned 7, not a LaunchDescription"),
     ]:

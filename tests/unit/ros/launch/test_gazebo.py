@@ -83,11 +83,11 @@ def test_gazebo_as_a_program_is_the_sim(follow: Follow) -> None:
 
 def test_an_unknown_launch_file_of_gazebo_is_reported(follow: Follow) -> None:
     for package, name, message in [
-        ("gazebo_ros", "gazeb.launch.py", r"has no 'launch/gazeb.launch.py' \(did you mean 'gazebo.launch.py'"),
+        ("gazebo_ros", "gazeb.launch.py", r"has no launch file 'gazeb.launch.py' \(did you mean 'gazebo.launch.py'"),
         (
             "ros_gz_sim",
             "ros_gz_spawn_model.launch.py",
-            r"has no 'launch/ros_gz_spawn_model.launch.py' \(did you mean 'gz_sim",
+            r"has no launch file 'ros_gz_spawn_model.launch.py' \(did you mean 'gz_sim",
         ),
         ("nav2_bringup", "x.launch.py", "no package 'nav2_bringup'"),
     ]:

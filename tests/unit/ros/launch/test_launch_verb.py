@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from holozen.messages import TFMessage
+from holozen.messages import Clock, TFMessage
 from holozen.messages.codec import decode
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.samples import Sample
@@ -82,12 +82,23 @@ def test_gazebos_own_launch_files_take_a_world(launch: Launch) -> None:
 
 def test_a_wrong_name_of_gazebos_launch_files_gets_the_closest(launch: Launch) -> None:
     for words, expected in [
-        (["gazebo_ros", "gazeboo.launch.py"], "has no 'launch/gazeboo.launch.py' (did you mean 'gazebo.launch.py'?)"),
-        (["ros_gz_sim", "qqqq.py"], "has no 'launch/qqqq.py'; files: gz_sim.launch.py"),
+        (["gazebo_ros", "gazeboo.launch.py"], "'gazeboo.launch.py' (did you mean 'gazebo.launch.py'?)"),
+        (["ros_gz_sim", "qqqq.py"], "'qqqq.py'; there are gz_sim.launch.py"),
     ]:
         done = launch(*words)
         assert (done.returncode, done.stderr.count("\n")) == (1, 1)
-        assert done.stderr == f"holozen launch: {words[0]} is replaced here, and {expected}\n"
+        start = f"holozen launch: {words[0]}, which holozen replaces, has no launch file"
+        assert done.stderr == f"{start} {expected}\n"
+
+
+def test_gazebo_in_a_launch_file_is_refused_beside_another_sim(launch: Launch, write: Write, wire: Wire) -> None:
+    wire.bus("sim").publisher("clock", Clock)
+    gazebo = "ExecuteProcess(cmd=['gazebo', 'empty.world'])"
+    path = write("a.launch.py", described(gazebo, "ExecuteProcess(cmd=['echo', 'started'])"))
+    done = launch(str(path))
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert done.stderr.startswith(f"holozen launch: {path}:8: sim@")
+    assert done.stderr.endswith(" simulates here already; end it, or leave Gazebo out of the launch file to use it\n")
 
 
 CONTROLLER = """#!/usr/bin/env python3
@@ -167,7 +178,7 @@ def test_a_launch_file_of_a_package_in_xml_is_not_read(launch: Launch, write: Wr
     write("src/my_bot/launch/a.launch.xml", "<launch/>")
     done = launch("my_bot", "a.launch.xml")
     assert (done.returncode, done.stderr.count("\n")) == (1, 1)
-    assert done.stderr.endswith("a.launch.xml: launch files in XML and YAML are not supported; Python only\n")
+    assert "a.launch.xml: launch files are in Python here; write a.launch.py, with a Node(package=..., " in done.stderr
 
 
 def test_what_cannot_be_followed_is_one_line(launch: Launch, write: Write) -> None:
@@ -220,7 +231,8 @@ def test_a_file_that_is_not_there_is_one_line(launch: Launch) -> None:
         (["my_bot", "b.launch.py"], 1, "no launch file 'b.launch.py' in "),
         (["my_boot", "a.launch.py"], 1, "no package 'my_boot' around "),
         (["my_bot"], 1, "my_bot is a package; give one of its launch files too: none"),
-        (["gazebo_ros"], 1, "gazebo_ros is replaced here, and has no 'launch'"),
+        (["gazebo_ros", "spawn_entity.py"], 1, "no launch file 'spawn_entity.py'; use `holozen spawn`"),
+        (["gazebo_ros"], 1, "gazebo_ros is a package; give one of its launch files too: gazebo.launch.py, "),
         (["my_boot"], 1, "my_boot does not exist, and there are no launch files in that folder"),
         (["a", "b", "c"], 2, "give FILE, or PACKAGE FILE, not 'a b c'"),
         (["x:=1"], 2, "give FILE, or PACKAGE FILE, not 'nothing'"),
