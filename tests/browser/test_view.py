@@ -28,6 +28,8 @@ from holozen.messages import (
     SimulationStatus,
     TFMessage,
     TransformStamped,
+    TriggerReply,
+    TriggerRequest,
     Vector3,
 )
 from holozen.messages import Path as PathMessage
@@ -248,6 +250,30 @@ def test_a_lost_network_stops_the_robot_and_a_button_that_was_held_does_not_go_o
         page.get_by_text("not driven").wait_for()
         seen = odom.count
         assert odom.wait(seen + 25, 5) and speed(odom) < 0.01, "what was held back moves nothing"
+        page.close()
+
+
+def test_a_release_that_waited_in_a_link_does_not_end_a_stop_from_after_it(
+    opened: Open, view: str, bus: Bus, odom: Latest[Odometry]
+) -> None:
+    def ask(verb: str) -> None:
+        bus.call(verb, TriggerRequest(), TriggerReply)
+
+    with Proxy(urlsplit(view).port or 0) as link:
+        page = opened(f"http://127.0.0.1:{link.port}/?token={TOKEN}", device_scale_factor=COARSE)
+        ask("stop")
+        page.get_by_text("stopped by test@").first.wait_for()
+        link.stall()
+        page.get_by_role("button", name="Release", exact=True).click()
+        ask("release")
+        ask("stop")
+        seen = odom.count
+        assert odom.wait(seen + 25, 5), "half a second later"
+        link.resume()
+        page.get_by_text("the link to this page is too slow to drive").wait_for()
+        page.get_by_text("stopped by test@").first.wait_for()
+        ask("release")
+        page.get_by_text("not driven").wait_for()
         page.close()
 
 
