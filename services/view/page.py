@@ -208,7 +208,7 @@ class Page:
         if driver := self._driver_of(shown):
             self._driven.add(driver)
             page, speeds = self._client.client_id, (float(self._speed.value), float(self._turn.value))
-            self._said = driver.use(lambda pad, now: pad.hold(page, button, now), speeds)
+            self._said = driver.hold(page, button, speeds)
 
     async def _on_release(self, button: str, _event: Any) -> None:
         self._let_go(button)
