@@ -14,7 +14,7 @@ from holozen.command.motion import AppliedForce, AppliedForces, JointMotion, Mot
 from holozen.command.wait_set import Moment, Reader
 from holozen.console import report
 from holozen.limits import STOP, Planar, clamp_speed
-from holozen.messages import CommandSource, CommandStatus, JointState, Message, Twist, TwistStamped, Wrench
+from holozen.messages import CommandSource, CommandStatus, Header, JointState, Message, Twist, TwistStamped, Wrench
 from holozen.messages.message import not_finite
 from holozen.suggest import listed
 from holozen.transport.pubsub import Received, Subscription
@@ -102,7 +102,7 @@ class Input(Generic[M]):
         """The age in s of a message by the stamp in its header, by the nearest clock; 0 without one. A stop may have
         any stamp.
         """
-        header = getattr(message, "header", None)
+        header: Header | None = getattr(message, "header", None)
         if not header or not (stamp := header.stamp.seconds()) or self.freshness.stops(message):
             return 0.0
         return min((now - stamp for now in moment.clocks), key=abs)
