@@ -26,7 +26,7 @@ from holozen.bag import formats
 from holozen.bus import Bus, BusError, Publisher, ServiceError
 from holozen.cli.param import Nodes
 from holozen.console import report
-from holozen.messages import JointState, Message, codec
+from holozen.messages import JointState, Message, PoseStamped, codec
 from holozen.messages.definitions import Interface, InterfaceError, whole_text
 from holozen.messages.registry import Registry
 from holozen.transport.graph import Endpoint
@@ -149,11 +149,39 @@ class Topic:
             self._raw = None
 
 
-def _moves(command: Message, stop: Message) -> bool:
-    """Whether a command moves anything."""
+def _moves(command: Message) -> bool:
+    """Whether a command of a velocity, of joints or of a force moves anything."""
     if isinstance(command, JointState):
-        return any(command.velocity) or any(command.effort)
-    return bool(getattr(command, "twist", command) != getattr(stop, "twist", stop))
+        return bool(command.position) or any(command.velocity) or any(command.effort)
+    value = getattr(command, "twist", command)
+    return bool(value != type(value)())
+
+
+class Turns:
+    """Which client drives each robot: to the robot all clients are one source. Any of them may stop it.
+
+    A client that was refused, or that another one stopped, moves the robot only once it has let go, and sent no motion
+    for TURN seconds: what it holds all the time moves nothing when the other one lets go.
+    """
+
+    def __init__(self) -> None:
+        self._drivers = dict[str, tuple[int, float]]()  # robot -> the client that last moved it, and when (s)
+        self._waiting = dict[tuple[str, int], float]()  # robot and client that has to let go -> its last motion (s)
+
+    def take(self, robot: str, client: int, moves: bool, now: float) -> bool:
+        """Take a command at `now` (s). Returns whether it counts. `moves`: it is no stop."""
+        self._waiting = {key: at for key, at in self._waiting.items() if now - at < TURN}
+        driver, since = self._drivers.get(robot, (client, now))
+        is_driven = driver != client and now - since < TURN
+        if moves and (is_driven or (robot, client) in self._waiting):
+            self._waiting[robot, client] = now
+            return False
+        if moves:
+            self._drivers[robot] = client, now
+        elif is_driven:
+            self._waiting[robot, driver] = now
+            del self._drivers[robot]
+        return True
 
 
 class Commands:
@@ -164,7 +192,7 @@ class Commands:
         self._lock = threading.Lock()
         self._open = dict[tuple[int, int], tuple[Publisher[Any], type[Message], str, list[Message]]]()  # with its stops
         self._ends = False
-        self._drivers = dict[str, tuple[int, float]]()  # by key: the client that last moved the robot, and when
+        self._turns = Turns()
 
     def open(self, client: int, channel: Any) -> None:
         """Let a client publish on a channel. Raises ValueError if no node reads that topic as that type."""
@@ -192,26 +220,19 @@ class Commands:
             key = str(publisher.key)
             try:
                 message = codec.decode(data, encoding, (kind,))
-                if is_command(key, (kind.ROS,)) and (fields := stop(message, kind.ROS)) is not None:
-                    stopped = kind(**fields)
-                    if _moves(message, stopped):
-                        self._take_turn(key, client)
-                    if stopped not in stops:
+                if is_command(key, (kind.ROS,)) and kind is not PoseStamped:  # to a goal the controller drives
+                    self._take_turn(key, client, message)
+                    fields = stop(message, kind.ROS)
+                    if fields is not None and (stopped := kind(**fields)) not in stops:
                         stops.append(stopped)
                         del stops[:-MAX_STOPS]
                 publisher.put(message)
             except codec.CodecError as error:
                 raise ValueError(f"/{key}: {error}") from None
 
-    def _take_turn(self, key: str, client: int) -> None:
-        """To the robot all clients are one source, so they take turns here. Raises ValueError while another one drives.
-        Any client may stop it.
-        """
-        now = time.monotonic()
-        driver, since = self._drivers.get(key, (client, now))
-        if driver != client and now - since < TURN:
-            raise ValueError(f"/{key}: somebody else drives")
-        self._drivers[key] = client, now
+    def _take_turn(self, key: str, client: int, command: Message) -> None:
+        if not self._turns.take(key.rpartition("/")[0], client, _moves(command), time.monotonic()):
+            raise ValueError(f"/{key}: somebody else drives, or has stopped the robot; let go first")
 
     def close(self, client: int, channel: int) -> None:
         """A client stops publishing on a channel: stop what it moved by it."""

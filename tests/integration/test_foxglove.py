@@ -18,6 +18,7 @@ from holozen.testing import Process, Wire, wait_for
 from .robots import record
 
 TOKEN = "sesame"
+TURN = 0.5  # s, of services.view.foxglove_server
 MESSAGE, SERVICE_RESPONSE = 1, 3  # the first byte of what the server sends in binary
 
 
@@ -166,12 +167,12 @@ def test_a_person_drives_and_the_robot_stops_when_the_connection_ends(wire: Wire
 
 
 def test_joints_stop_when_the_connection_ends(wire: Wire, view: Callable[..., str]) -> None:
-    async def seen(foxglove: Any, command: bytes, rate: float) -> None:
+    async def seen(foxglove: Any, command: bytes, rate: float, every: float = 0.1) -> None:
         """Publish a command until it arrives: one that comes too late counts for nothing."""
         async with asyncio.timeout(30):
             while not commands.messages() or commands.messages()[-1].velocity != [rate]:
                 await foxglove.publish(7, command)
-                await asyncio.sleep(0.1)
+                await asyncio.sleep(every)
 
     async def turn(address: str) -> None:
         channel = {"id": 7, "topic": "/joint_command", "encoding": "json", "schemaName": JointState.ROS}
@@ -181,7 +182,7 @@ def test_joints_stop_when_the_connection_ends(wire: Wire, view: Callable[..., st
             async with client(address) as other:  # another client may stop them
                 await other.send(op="advertise", channels=[channel])
                 await seen(other, b'{"header": {"frame_id": "x"}, "name": ["a"], "velocity": [0.0]}', 0.0)
-            await seen(foxglove, b'{"name": ["a"], "velocity": [2.0]}', 2.0)
+            await seen(foxglove, b'{"name": ["a"], "velocity": [2.0]}', 2.0, every=2 * TURN)  # it has to let go
 
     commands = record(wire.bus("watcher"), "joint_command", JointState)
     asyncio.run(turn(view()))
