@@ -38,7 +38,8 @@ from .guard import Guard, TimedConnection
 
 PROTOCOL = Subprotocol("foxglove.sdk.v1")
 OLDER = Subprotocol("foxglove.websocket.v1")  # the same by another name, which older clients ask for
-MESSAGE = b"\x01"  # the first byte of a frame with a message that a client publishes
+MESSAGE, CALL_OF = b"\x01", b"\x02"  # the first bytes of frames in which a client publishes, and calls a service
+FREEING = ("release", "resume")  # the services after which a robot may move; no late call ends a stop from after it
 LOOK_EVERY, DRAIN_EVERY = 0.5, 0.01  # s; how often the graph is read, and the topics are
 DEPTH = 64  # messages of a topic that wait
 CALL = 5.0  # s for a service
@@ -49,11 +50,6 @@ VOUCHED = 0xFFFF_FFFF  # the number of the channel by which the relay vouches fo
 LOOK_ONLY = "this view is read-only: it was started with --look-only"
 
 
-def publishes(data: bytes) -> bool:
-    """Whether a client's frame publishes a message, which moves a robot if it is a command."""
-    return data[:1] == MESSAGE
-
-
 class Relay:
     """A WebSocket server that relays the clients that `guard` admits to the `inner` port on loopback. It vouches for
     them by the `secret`.
@@ -61,6 +57,8 @@ class Relay:
 
     def __init__(self, guard: Guard, host: str, port: int, inner: int, secret: str) -> None:
         self._guard, self._inner, self._secret = guard, f"ws://127.0.0.1:{inner}", secret
+        self._freeing = set[bytes]()  # the numbers of services, as they are in a call
+        guard.moves = self._moves
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
@@ -86,11 +84,25 @@ class Relay:
             await server.send(json.dumps({"op": "advertise", "channels": [channel]}))
             tasks = [
                 asyncio.create_task(task)
-                for task in (client.ping_often(), _copy(client, server), _copy(server, client))
+                for task in (client.ping_often(), _copy(client, server), self._answer(server, client))
             ]
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in tasks:
                 task.cancel()
+
+    async def _answer(self, server: to_server.ClientConnection, client: for_clients.ServerConnection) -> None:
+        """Copy what the server sends, and note the numbers of its services."""
+        with contextlib.suppress(ConnectionClosed):
+            async for message in server:
+                if isinstance(message, str) and '"advertiseServices"' in message:
+                    for one in json.loads(message)["services"]:
+                        if one["name"].rpartition("/")[2] in FREEING:
+                            self._freeing.add(one["id"].to_bytes(4, "little"))
+                await client.send(message)
+
+    def _moves(self, data: bytes) -> bool:
+        """Whether a client's frame publishes a message, which moves a robot if it is a command, or lets one move."""
+        return data[:1] == MESSAGE or (data[:1] == CALL_OF and data[1:5] in self._freeing)
 
     def close(self) -> None:
         """Disconnect all clients, and end."""

@@ -47,8 +47,9 @@ class Guard:
     have the token.
     """
 
-    def __init__(self, token: str, moves: Callable[[bytes], bool] = moves, apps: bool = False) -> None:
-        self._token, self.moves, self._apps = token, moves, apps
+    def __init__(self, token: str, apps: bool = False) -> None:
+        self._token, self._apps = token, apps
+        self.moves: Callable[[bytes], bool] = moves
         self.quiet = logging.getLogger("holozen.view")  # each refused request would be a traceback
         self.quiet.setLevel(logging.CRITICAL)
         self.installed = False
