@@ -119,7 +119,7 @@ def test_a_command_with_an_old_stamp_moves_no_joint(rover: Rover) -> None:
 
     def is_refused() -> bool:
         rover.commands.put(old)
-        return rover.robot.last_status().refused.get("stale", 0) > refused + 3
+        return bool(rover.robot.last_status().refused.get("stale", 0) > refused + 3)
 
     wait_for(is_refused, what="the commands to be refused as stale")
     assert rover.newest()[0] == pytest.approx(held, abs=HELD)
