@@ -352,6 +352,21 @@ def test_stop_counts_while_a_button_of_the_same_page_is_held(page: Page, odom: L
         page.get_by_text("not driven").wait_for()
 
 
+def test_stop_counts_while_a_slider_of_the_page_moves(page: Page) -> None:
+    stop = page.get_by_role("button", name="Stop", exact=True).element_handle()
+    page.get_by_role("slider").first.evaluate(
+        """(slider, stop) => {
+          const move = () => slider.dispatchEvent(
+            new KeyboardEvent("keydown", {key: "ArrowRight", code: "ArrowRight", bubbles: true}));
+          move(); stop.click(); move();
+        }""",
+        stop,
+    )
+    page.get_by_text("stopped by view@").first.wait_for()
+    page.get_by_role("button", name="Release", exact=True).click()
+    page.get_by_text("not driven").wait_for()
+
+
 def test_displays_show_what_topics_hold_in_the_frames_of_tf(page: Page, bus: Bus, odom: Latest[Odometry]) -> None:
     page.get_by_role("tab", name="Displays").click()
     scans, frames = bus.publisher("scan", LaserScan), bus.publisher("tf", TFMessage)
