@@ -14,7 +14,7 @@ from holozen import wire
 from holozen.bag import BagError, Channel, Message
 from holozen.bus import Bus
 from holozen.console import report
-from holozen.messages import Header, Time, TwistStamped, codec, named
+from holozen.messages import JointState, Time, TwistStamped, codec, named
 from holozen.messages import Message as Struct
 from holozen.terminal import single_keys
 from holozen.transport.graph import Endpoint, includes, on_key
@@ -204,12 +204,10 @@ def _kinds(channel: Channel, target: str) -> tuple[type[Struct], ...]:
 
 def _restamped(message: Message, command: Struct) -> bytes:
     """The payload of a command, with a stamp of this moment if it has one: robots refuse old stamps."""
-    if isinstance(command, TwistStamped) and command.header.stamp.seconds():
-        header = Header(Time.of(time.time()), command.header.frame_id)
+    if isinstance(command, TwistStamped | JointState) and command.header.stamp.seconds():
+        command.header.stamp = Time.of(time.time())
         with contextlib.suppress(codec.CodecError):  # the robot refuses it, with its reason
-            return codec.encode(
-                TwistStamped(header, command.twist), codec.form(message.payload, message.channel.encoding)
-            )
+            return codec.encode(command, codec.form(message.payload, message.channel.encoding))
     return message.payload
 
 

@@ -26,7 +26,7 @@ from holozen.messages import WIRES, CodecError, encoding_of
 from holozen.messages.definitions import Interface, InterfaceError, completed, with_mappings
 from holozen.messages.registry import Registry
 from holozen.process import stop_event
-from holozen.suggest import suggest
+from holozen.suggest import listed, suggest
 from holozen.transport.graph import Endpoint, on_key, subscribers
 from holozen.transport.pubsub import Latest, RawPublisher, Subscription
 from holozen.transport.samples import Sample
@@ -91,9 +91,21 @@ def _run(
                 feedback.report_held()
     if args.json:
         print(json.dumps({"key": args.key, "type": form.kind.name, "subscribers": matched, "published": sent}))
-    if not (feedback and feedback.refusal and (args.once or args.times)):
+    if not (args.once or args.times):
         return 0
+    if not feedback or not feedback.refusal:
+        return int(matched and form.is_goal and _is_only_watched(bus, args.key))
     return int(payload not in form.stops or not feedback.stands)
+
+
+def _is_only_watched(bus: Bus, key: str) -> bool:
+    """Report that no controller reads a goal, if all subscribers of its key read any type, as `topic echo` does."""
+    ends = on_key(bus.graph().settled(bus.connected), key, "sub")
+    if not ends or any(end.type != "any/msg/Any" for end in ends):  # a foreign one has no token
+        return False
+    command = " ".join(filter(None, ("holozen controller", key.rpartition("/")[0], "--laps 0")))
+    report(f"{key}: no controller reads it, only {listed(end.node for end in ends)}; `{command}` drives there")
+    return True
 
 
 def _form(args: argparse.Namespace) -> Form | None:
@@ -275,6 +287,11 @@ class Form:
     def is_velocity(self) -> bool:
         """Whether it commands a velocity."""
         return self._is_command and self.kind.name in wire.VELOCITIES
+
+    @property
+    def is_goal(self) -> bool:
+        """Whether it is a goal, to which a controller drives."""
+        return self._is_command and not self.status_key
 
     @property
     def status_key(self) -> str:

@@ -187,7 +187,7 @@ NOTES = (
     "Keys that move robots are left out unless"
     " --commands is given, and so are keys that have a publisher now (see --remap). In a terminal, space pauses and"
     " resumes, and during a pause the right arrow (or s) plays the next message. Payloads are unchanged, but"
-    " for the stamps of commands (TwistStamped), which become the time of playing."
+    " for the stamps of commands, which become the time of playing."
 )
 VERBS = by_name(
     *(Verb(name, ABOUT, "square.mcap --remap odom:=old/odom -r 2", _arguments, run,

@@ -101,7 +101,8 @@ class Freshness(Generic[M]):
         stops: Callable[[M], bool],
         drives: Callable[[str, float], bool],
     ) -> None:
-        self._keys, self._senders, self._stops, self._drives = keys, senders, stops, drives
+        self._keys, self._senders, self._drives = keys, senders, drives
+        self.stops = stops  # whether a message is a stop
         self.max_age = COMMAND_SILENCE
         self._newest: OrderedDict[Sender, tuple[float, int]] = OrderedDict()  # the newest command: sent when, number
         self._heard: OrderedDict[Sender, tuple[float, int]] = OrderedDict()  # likewise, for each name of a session
@@ -138,7 +139,7 @@ class Freshness(Generic[M]):
             stamp = received.stamp
             if received.message is None or sender.key not in self._keys:
                 yield Judged(received, since, 0.0, "")  # refused later, by CommandStats.validated
-            elif self._stops(received.message):
+            elif self.stops(received.message):
                 self._waiting.pop(sender, None)  # earlier commands are void
                 if stamp and self._ages(stamp, now):
                     self._gap(received, stamp)

@@ -14,7 +14,7 @@ from holozen.command.motion import AppliedForce, AppliedForces, JointMotion, Mot
 from holozen.command.wait_set import Moment, Reader
 from holozen.console import report
 from holozen.limits import STOP, Planar, clamp_speed
-from holozen.messages import CommandSource, CommandStatus, JointState, Message, Twist, TwistStamped, Wrench
+from holozen.messages import CommandSource, CommandStatus, Header, JointState, Message, Twist, TwistStamped, Wrench
 from holozen.messages.message import not_finite
 from holozen.suggest import listed
 from holozen.transport.pubsub import Received, Subscription
@@ -39,7 +39,7 @@ UNPROVEN = "unproven"  # the kind of refusal of a command without proof of its s
 
 class Command(NamedTuple, Generic[M]):
     """A valid message on `key` from `source`, with its `rank`, read at a `moment`, and `sent` then. `age` in s is that
-    by a stamp in the message itself; 0 without one.
+    by the stamp in its header; 0 without one.
     """
 
     message: M
@@ -99,11 +99,18 @@ class Input(Generic[M]):
         """Called for each sample, whether it is valid or not. Does nothing; override it."""
 
     def _stamp_age(self, message: M, moment: Moment) -> float:
-        """The age in s of a message by a stamp in it; 0 if it has none that counts."""
-        return 0.0
+        """The age in s of a message by the stamp in its header, by the nearest clock; 0 without one. A stop may have
+        any stamp.
+        """
+        header: Header | None = getattr(message, "header", None)
+        if not header or not (stamp := header.stamp.seconds()) or self.freshness.stops(message):
+            return 0.0
+        return min((now - stamp for now in moment.clocks), key=abs)
 
     def _refusal(self, command: Command[M]) -> str:
         """Why a command is refused, beginning with the kind of reason and a colon; empty if it is not."""
+        if abs(command.age) > MAX_STAMP_AGE:
+            return f"stale: its stamp is {command.age:.1f} s old; at most {MAX_STAMP_AGE} s"
         return ""
 
     def _obey(self, command: Command[M]) -> None:
@@ -194,18 +201,10 @@ class TwistInput(Input[Twist | TwistStamped]):
             ],
         )
 
-    def _stamp_age(self, message: Twist | TwistStamped, moment: Moment) -> float:
-        """By the nearest clock. A stop may have any stamp."""
-        if not isinstance(message, TwistStamped) or not (stamp := message.header.stamp.seconds()) or _stops(message):
-            return 0.0
-        return min((now - stamp for now in moment.clocks), key=abs)
-
     def _refusal(self, command: Command[Twist | TwistStamped]) -> str:
         if self._always_refused and not _stops(command.message):
             return self._always_refused
-        if abs(command.age) > MAX_STAMP_AGE:
-            return f"stale: its stamp is {command.age:.1f} s old; at most {MAX_STAMP_AGE} s"
-        return ""
+        return super()._refusal(command)
 
     def _obey(self, command: Command[Twist | TwistStamped]) -> None:
         velocity = _velocity(command.message)

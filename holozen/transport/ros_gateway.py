@@ -56,6 +56,11 @@ UNKNOWN_AGE = (
     f"a first command has a time of sending more than {wire.COMMAND_SILENCE:g} s from this machine's clock; it is late,"
     f" or the clocks differ: set them, or go on publishing, and after {rmw.PACE:g} s commands are forwarded"
 )
+FREEING = ("release", "resume")  # the services after which a robot may move; no late call ends a stop from after it
+LATE = (
+    f"it was sent more than {wire.COMMAND_SILENCE:g} s from this machine's clock: it is late, and has to be sent again,"
+    " or the clocks differ: set them, or use `holozen release` or `holozen controller --resume`"
+)
 FAILED = 4  # OPERATION_FAILED of simulation_interfaces/msg/Result
 SHARED = ("tf", "tf_static")  # topics with several publishers by nature
 DESCRIPTION, STRING = "robot_description", "std_msgs/msg/String"
@@ -426,9 +431,13 @@ class Gateway:
         interface = self._registry.find(found.type)
         assert interface.request
         assert interface.response
-        attachment = self._form.answered(bytes(query.attachment or b""))
+        asked = bytes(query.attachment or b"")
+        attachment, stamp = self._form.answered(asked), rmw.attachment(asked)  # bridges to DDS send none
         request = f"application/cdr;{interface.request.name}"
         try:
+            is_late = stamp and abs(time.time() - stamp.sent / 1e9) > wire.COMMAND_SILENCE
+            if is_late and found.topic.rpartition("/")[2] in FREEING:
+                raise ServiceError(LATE)
             reply = self._replied(found.topic, bytes(query.payload or b""), request)
             payload = codec.transcoded(interface.response, reply.payload, reply.encoding)
         except ServiceError as error:

@@ -40,6 +40,7 @@ KEPT_BYTES = 4096  # the largest of them; requests with larger replies only read
 SIMULTANEOUS = 0.05  # s; a request that was sent so shortly before an event counts as sent after it
 PROOFS = 5  # times that a caller may tell how long its request has waited: a busy computer reads a reply late
 ANSWERED = 40  # servers whose question a request answers, so that its attachment is not too long
+FAILED = "{key}: internal error, see the server's log"
 MAX_REQUEST_BYTES = 5_000_000  # a robot's URDF has at most 4 MB; larger ones are refused unread
 
 
@@ -164,15 +165,18 @@ class Server(Declared):
             raise BusError("closed") from None
 
     def start(self) -> None:
-        """Answer from a separate thread, until the bus is closed."""
+        """Answer from a separate thread, until the bus is closed. `sys.exit` in an answer does not end that."""
         self.thread = threading.Thread(target=self._serve, daemon=True)
         self.thread.start()
 
     def _serve(self) -> None:
         for query in until_closed(self.recv):
             self.keep(query)
-            while self.answer_pending(most=1):
-                pass
+            try:
+                while self.answer_pending(most=1):
+                    pass
+            except SystemExit as end:
+                report(f"{self._key}: sys.exit({end.code!r}) in its thread ends nothing; the service goes on")
 
     @property
     def is_waiting(self) -> bool:
@@ -205,7 +209,10 @@ class Server(Declared):
                 refuse(query, str(error))
             except Exception as error:
                 report(f"{self._key}: {type(error).__name__}: {error}")
-                refuse(query, f"{self._key}: internal error, see the server's log")
+                refuse(query, FAILED.format(key=self._key))
+            except BaseException:  # sys.exit, or Ctrl-C
+                refuse(query, FAILED.format(key=self._key))
+                raise
 
     def _any(self, query: Any) -> Any:
         """The request, or an empty one if it cannot be read."""

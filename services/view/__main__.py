@@ -118,13 +118,13 @@ def _serve_foxglove(args: argparse.Namespace, where: connection.Connection, toke
     stop = stop_event()
     try:
         _check_port(args.host, args.port)
-        from .foxglove_server import Relay, Server, publishes
+        from .foxglove_server import Relay, Server
         from .guard import Guard
 
         with Bus("view", where, lasting=True, stop=stop) as bus, contextlib.ExitStack() as ending:
             server = Server(bus, args.look_only)
             ending.callback(server.close)
-            relay = Relay(Guard(token, publishes, apps=True), args.host, args.port, server.port, server.secret)
+            relay = Relay(Guard(token, apps=True), args.host, args.port, server.port, server.secret)
             ending.callback(relay.close)
             ending.callback(server.halt)  # first: clients may take their time
             for line in _addresses(args, relay.port, token, "ws"):

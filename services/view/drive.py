@@ -43,11 +43,18 @@ class Driver:
         """The publisher of commands, declared with the first one: a page that only looks is no publisher."""
         return self._bus.publisher(self._command, Twist, PRIORITY_OF["view"])
 
-    def use(self, act: Callable[[Pad, float], T], speeds: tuple[float, float] | None = None) -> T:
-        """Call `act` with its pad and the present time (s), and return the result. `speeds` (m/s, rad/s) if new."""
+    def use(self, act: Callable[[Pad, float], T]) -> T:
+        """Call `act` with its pad and the present time (s), and return the result."""
         with self._lock:
-            self._speeds = speeds or self._speeds
             return act(self._pad, time.monotonic())
+
+    def hold(self, page: int, button: str, speeds: tuple[float, float]) -> str:
+        """A page reports a held button, and its speeds (m/s, rad/s). Returns why that does not count, or ""."""
+        with self._lock:
+            why = self._pad.hold(page, button, time.monotonic())
+            if not why:
+                self._speeds = speeds
+            return why
 
     def publish(self) -> bool:
         """Publish what is due. Returns whether the pad is in use."""

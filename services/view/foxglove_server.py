@@ -26,7 +26,7 @@ from holozen.bag import formats
 from holozen.bus import Bus, BusError, Publisher, ServiceError
 from holozen.cli.param import Nodes
 from holozen.console import report
-from holozen.messages import JointState, Message, codec
+from holozen.messages import JointState, Message, PoseStamped, codec
 from holozen.messages.definitions import Interface, InterfaceError, whole_text
 from holozen.messages.registry import Registry
 from holozen.transport.graph import Endpoint
@@ -38,7 +38,8 @@ from .guard import Guard, TimedConnection
 
 PROTOCOL = Subprotocol("foxglove.sdk.v1")
 OLDER = Subprotocol("foxglove.websocket.v1")  # the same by another name, which older clients ask for
-MESSAGE = b"\x01"  # the first byte of a frame with a message that a client publishes
+MESSAGE, CALL_OF = b"\x01", b"\x02"  # the first bytes of frames in which a client publishes, and calls a service
+FREEING = ("release", "resume")  # the services after which a robot may move; no late call ends a stop from after it
 LOOK_EVERY, DRAIN_EVERY = 0.5, 0.01  # s; how often the graph is read, and the topics are
 DEPTH = 64  # messages of a topic that wait
 CALL = 5.0  # s for a service
@@ -49,11 +50,6 @@ VOUCHED = 0xFFFF_FFFF  # the number of the channel by which the relay vouches fo
 LOOK_ONLY = "this view is read-only: it was started with --look-only"
 
 
-def publishes(data: bytes) -> bool:
-    """Whether a client's frame publishes a message, which moves a robot if it is a command."""
-    return data[:1] == MESSAGE
-
-
 class Relay:
     """A WebSocket server that relays the clients that `guard` admits to the `inner` port on loopback. It vouches for
     them by the `secret`.
@@ -61,6 +57,8 @@ class Relay:
 
     def __init__(self, guard: Guard, host: str, port: int, inner: int, secret: str) -> None:
         self._guard, self._inner, self._secret = guard, f"ws://127.0.0.1:{inner}", secret
+        self._freeing = set[bytes]()  # the numbers of services, as they are in a call
+        guard.moves = self._moves
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
@@ -86,11 +84,25 @@ class Relay:
             await server.send(json.dumps({"op": "advertise", "channels": [channel]}))
             tasks = [
                 asyncio.create_task(task)
-                for task in (client.ping_often(), _copy(client, server), _copy(server, client))
+                for task in (client.ping_often(), _copy(client, server), self._answer(server, client))
             ]
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in tasks:
                 task.cancel()
+
+    async def _answer(self, server: to_server.ClientConnection, client: for_clients.ServerConnection) -> None:
+        """Copy what the server sends, and note the numbers of its services."""
+        with contextlib.suppress(ConnectionClosed):
+            async for message in server:
+                if isinstance(message, str) and '"advertiseServices"' in message:
+                    for one in json.loads(message)["services"]:
+                        if one["name"].rpartition("/")[2] in FREEING:
+                            self._freeing.add(one["id"].to_bytes(4, "little"))
+                await client.send(message)
+
+    def _moves(self, data: bytes) -> bool:
+        """Whether a client's frame publishes a message, which moves a robot if it is a command, or lets one move."""
+        return data[:1] == MESSAGE or (data[:1] == CALL_OF and data[1:5] in self._freeing)
 
     def close(self) -> None:
         """Disconnect all clients, and end."""
@@ -149,11 +161,39 @@ class Topic:
             self._raw = None
 
 
-def _moves(command: Message, stop: Message) -> bool:
-    """Whether a command moves anything."""
+def _moves(command: Message) -> bool:
+    """Whether a command of a velocity, of joints or of a force moves anything."""
     if isinstance(command, JointState):
-        return any(command.velocity) or any(command.effort)
-    return bool(getattr(command, "twist", command) != getattr(stop, "twist", stop))
+        return bool(command.position) or any(command.velocity) or any(command.effort)
+    value = getattr(command, "twist", command)
+    return bool(value != type(value)())
+
+
+class Turns:
+    """Which client drives each robot: to the robot all clients are one source. Any of them may stop it.
+
+    A client that was refused, or that another one stopped, moves the robot only once it has let go, and sent no motion
+    for TURN seconds: what it holds all the time moves nothing when the other one lets go.
+    """
+
+    def __init__(self) -> None:
+        self._drivers = dict[str, tuple[int, float]]()  # robot -> the client that last moved it, and when (s)
+        self._waiting = dict[tuple[str, int], float]()  # robot and client that has to let go -> its last motion (s)
+
+    def take(self, robot: str, client: int, moves: bool, now: float) -> bool:
+        """Take a command at `now` (s). Returns whether it counts. `moves`: it is no stop."""
+        self._waiting = {key: at for key, at in self._waiting.items() if now - at < TURN}
+        driver, since = self._drivers.get(robot, (client, now))
+        is_driven = driver != client and now - since < TURN
+        if moves and (is_driven or (robot, client) in self._waiting):
+            self._waiting[robot, client] = now
+            return False
+        if moves:
+            self._drivers[robot] = client, now
+        elif is_driven:
+            self._waiting[robot, driver] = now
+            del self._drivers[robot]
+        return True
 
 
 class Commands:
@@ -164,7 +204,7 @@ class Commands:
         self._lock = threading.Lock()
         self._open = dict[tuple[int, int], tuple[Publisher[Any], type[Message], str, list[Message]]]()  # with its stops
         self._ends = False
-        self._drivers = dict[str, tuple[int, float]]()  # by key: the client that last moved the robot, and when
+        self._turns = Turns()
 
     def open(self, client: int, channel: Any) -> None:
         """Let a client publish on a channel. Raises ValueError if no node reads that topic as that type."""
@@ -192,26 +232,19 @@ class Commands:
             key = str(publisher.key)
             try:
                 message = codec.decode(data, encoding, (kind,))
-                if is_command(key, (kind.ROS,)) and (fields := stop(message, kind.ROS)) is not None:
-                    stopped = kind(**fields)
-                    if _moves(message, stopped):
-                        self._take_turn(key, client)
-                    if stopped not in stops:
+                if is_command(key, (kind.ROS,)) and kind is not PoseStamped:  # to a goal the controller drives
+                    self._take_turn(key, client, message)
+                    fields = stop(message, kind.ROS)
+                    if fields is not None and (stopped := kind(**fields)) not in stops:
                         stops.append(stopped)
                         del stops[:-MAX_STOPS]
                 publisher.put(message)
             except codec.CodecError as error:
                 raise ValueError(f"/{key}: {error}") from None
 
-    def _take_turn(self, key: str, client: int) -> None:
-        """To the robot all clients are one source, so they take turns here. Raises ValueError while another one drives.
-        Any client may stop it.
-        """
-        now = time.monotonic()
-        driver, since = self._drivers.get(key, (client, now))
-        if driver != client and now - since < TURN:
-            raise ValueError(f"/{key}: somebody else drives")
-        self._drivers[key] = client, now
+    def _take_turn(self, key: str, client: int, command: Message) -> None:
+        if not self._turns.take(key.rpartition("/")[0], client, _moves(command), time.monotonic()):
+            raise ValueError(f"/{key}: somebody else drives, or has stopped the robot; let go first")
 
     def close(self, client: int, channel: int) -> None:
         """A client stops publishing on a channel: stop what it moved by it."""

@@ -23,18 +23,21 @@ from websockets.frames import DATA_OPCODES, Frame, Opcode
 from websockets.http11 import Request, Response
 
 PING_EVERY = 0.05  # s
-MAX_AGE = 0.3  # s; the report of a held button that may be older moves nothing
+MAX_AGE = 0.3  # s; what may be older moves nothing, and ends no stop
 LET_GO = b"""<script>
 addEventListener("blur", () => document.querySelectorAll("button").forEach(
   button => button.dispatchEvent(new PointerEvent("pointercancel", {bubbles: true}))))
 </script>"""
 """A script that releases held buttons when another window comes to the front; viser's page would go on holding them."""
-MOVING = (b"GuiButtonHoldMessage", b"ScenePointerMessage")  # the names of viser's messages that may move a robot
+MOVING = (b"GuiButtonHoldMessage", b"ScenePointerMessage", b"TransformControls")
+"""The names of viser's messages that may move a robot."""
+FREEING = tuple(bytes([0xA0 | len(text)]) + text.encode() for text in ("Release", "Resume", "Play"))
+"""The texts, in MessagePack, of the buttons after which a robot may move. No late click ends a stop from after it."""
 
 
 def moves(data: bytes) -> bool:
-    """Whether a message of viser's page may move a robot."""
-    return any(name in data for name in MOVING)
+    """Whether a message of viser's page may move a robot, or let it move."""
+    return any(part in data for part in (*MOVING, *FREEING))
 
 
 class Guard:
@@ -44,8 +47,9 @@ class Guard:
     have the token.
     """
 
-    def __init__(self, token: str, moves: Callable[[bytes], bool] = moves, apps: bool = False) -> None:
-        self._token, self.moves, self._apps = token, moves, apps
+    def __init__(self, token: str, apps: bool = False) -> None:
+        self._token, self._apps = token, apps
+        self.moves: Callable[[bytes], bool] = moves
         self.quiet = logging.getLogger("holozen.view")  # each refused request would be a traceback
         self.quiet.setLevel(logging.CRITICAL)
         self.installed = False

@@ -133,19 +133,20 @@ class Page:
 
     def _add_pad(self) -> viser.PanelHandle:
         add = self._client.gui
-        self._speed = add.add_slider("Speed, m/s", 0.1, 2.0, 0.1, SPEED)
-        self._turn = add.add_slider("Turn, rad/s", 0.1, 3.0, 0.1, TURN)
         add.add_button("Stop", color="red").on_click(lambda _: self._call("stop"))
         after = add.add_button_group("", ("Release", "Resume"), hint="end a stop; let overruled sources drive again")
         after.on_click(lambda _: self._call(after.value.lower()))
         # The pad has its own panel: of all that one panel reports within 50 ms, viser's page sends only the last. In
-        # the same panel, held buttons would suppress a click on Stop, or the choice of another robot.
+        # the same panel, held buttons or a slider that is dragged would suppress a click on Stop.
         panel = add.add_panel()
         self._pad = panel.add_tab("Drive")
         panel.float(x=15, y=-15, width=PAD_WIDTH)
         panel.expand()  # on a phone it would be closed
         for button in DIRECTIONS:
             self._add_button(button)
+        with self._pad:
+            self._speed = add.add_slider("Speed, m/s", 0.1, 2.0, 0.1, SPEED)
+            self._turn = add.add_slider("Turn, rad/s", 0.1, 3.0, 0.1, TURN)
         with panel.add_tab("World"):
             self._add_camera()
             self._world = WorldTab(
@@ -208,7 +209,7 @@ class Page:
         if driver := self._driver_of(shown):
             self._driven.add(driver)
             page, speeds = self._client.client_id, (float(self._speed.value), float(self._turn.value))
-            self._said = driver.use(lambda pad, now: pad.hold(page, button, now), speeds)
+            self._said = driver.hold(page, button, speeds)
 
     async def _on_release(self, button: str, _event: Any) -> None:
         self._let_go(button)

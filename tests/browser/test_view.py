@@ -28,6 +28,8 @@ from holozen.messages import (
     SimulationStatus,
     TFMessage,
     TransformStamped,
+    TriggerReply,
+    TriggerRequest,
     Vector3,
 )
 from holozen.messages import Path as PathMessage
@@ -286,9 +288,12 @@ def turns(odom: Latest[Odometry]) -> bool:
 def test_a_thumb_drives_on_the_screen_of_a_phone(phone: Page, odom: Latest[Odometry]) -> None:
     button = phone.get_by_role("button", name="Right", exact=True)
 
+    boxes = [button.bounding_box()]
+
     def within_reach() -> Any:  # without scrolling, once the panel has slid up
-        box = button.bounding_box()
-        return box if box and box["y"] + box["height"] < PHONE["height"] else None
+        boxes.append(box := button.bounding_box())
+        phone.evaluate(TWO_FRAMES)
+        return box if box == boxes[-2] and box and box["y"] + box["height"] < PHONE["height"] else None
 
     box = wait_for(within_reach, what="the pad")
     thumb = {"x": box["x"] + 30, "y": box["y"] + box["height"] / 2}
@@ -310,6 +315,42 @@ def test_a_lost_network_stops_the_robot_and_a_button_that_was_held_does_not_go_o
     seen = odom.count
     assert odom.wait(seen + 25, 5) and speed(odom) < 0.01, "what was held back moves nothing"
     phone.mouse.up()
+
+
+def test_a_release_that_waited_in_a_link_does_not_end_a_stop_from_after_it(
+    phone: Page, link: Proxy, bus: Bus, odom: Latest[Odometry]
+) -> None:
+    def ask(verb: str) -> None:
+        bus.call(verb, TriggerRequest(), TriggerReply)
+
+    ask("stop")
+    phone.get_by_text("stopped by test@").first.wait_for()
+    link.stall()
+    phone.get_by_role("button", name="Release", exact=True).click()
+    ask("release")
+    ask("stop")
+    seen = odom.count
+    assert odom.wait(seen + 25, 5), "half a second later"
+    link.resume()
+    phone.get_by_text("the link to this page is too slow to drive").wait_for()
+    phone.get_by_text("stopped by test@").first.wait_for()
+    ask("release")
+    phone.get_by_text("not driven").wait_for()
+
+
+def test_stop_counts_while_a_slider_of_the_page_moves(phone: Page) -> None:
+    stop = phone.get_by_role("button", name="Stop", exact=True).element_handle()
+    phone.get_by_role("slider").first.evaluate(
+        """(slider, stop) => {
+          const key = kind => slider.dispatchEvent(
+            new KeyboardEvent(kind, {key: "ArrowRight", code: "ArrowRight", bubbles: true}));
+          key("keydown"); stop.click(); key("keydown"); key("keyup");
+        }""",
+        stop,
+    )
+    phone.get_by_text("stopped by view@").first.wait_for()
+    phone.get_by_role("button", name="Release", exact=True).click()
+    phone.get_by_text("not driven").wait_for()
 
 
 def test_a_second_page_shows_the_driver_stops_it_drives_itself_and_stops_when_it_is_closed(
@@ -563,7 +604,8 @@ def test_the_sim_is_paused_stepped_played_and_reset_by_its_buttons(
 def test_a_robot_is_moved_by_its_handles(page: Page, bus: Bus, odom: Latest[Odometry]) -> None:
     page.get_by_role("tab", name="World").click()
     page.get_by_text("Move by handles").click()
-    x, y = place(odom)
+    x, y = 0.0, 0.0
+    put(bus, odom, x, y)
     wait_for(lambda: colored(page, lambda r, g, b: (g - r > 40) & (g - b > 30)), what="the handles; one is green")
 
     def moved() -> bool:
@@ -609,11 +651,11 @@ def test_the_camera_follows_and_looks_down(page: Page, bus: Bus, odom: Latest[Od
         return found is not None and math.dist(found, middle) < 2 * NEAR
 
     page.get_by_role("tab", name="World").click()
-    page.get_by_text("Follow").click()
+    page.get_by_text("Follow", exact=True).click()
     for x in (1.0, 3.0):
         put(bus, odom, x, 2.0)
         wait_for(in_the_middle, what=f"the robot at {x} in the middle")
-    page.get_by_text("Follow").click()
+    page.get_by_text("Follow", exact=True).click()
     page.get_by_role("button", name="Top view").click()
     wait_for(in_the_middle, what="the robot from above in the middle")
 

@@ -6,18 +6,22 @@ import struct
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidStatus
 from websockets.typing import Subprotocol
 
-from holozen.messages import CommandStatus, JointState, Odometry, TriggerReply, Twist, codec
+from holozen.messages import CommandStatus, JointState, Odometry, TriggerReply, TriggerRequest, Twist, codec
 from holozen.testing import Process, Wire, wait_for
+from tests.faults.proxy import Proxy
 
 from .robots import record
 
 TOKEN = "sesame"
+EMPTY = b"\0\1\0\0\0"  # a Trigger's request in CDR
+TURN = 0.5  # s, of services.view.foxglove_server
 MESSAGE, SERVICE_RESPONSE = 1, 3  # the first byte of what the server sends in binary
 
 
@@ -107,7 +111,7 @@ def test_topics_services_and_parameters_come_with_their_schemas(view: Callable[.
 
             service = await foxglove.until(lambda: foxglove.services.get("/stop"))
             assert service["type"] == "std_srvs/srv/Trigger"
-            await foxglove.call(service["id"], b"\0\1\0\0\0")
+            await foxglove.call(service["id"], EMPTY)
             await foxglove.until(lambda: foxglove.replies)
             reply = codec.decode(foxglove.replies[0], "application/cdr;std_srvs/srv/Trigger_Response", (TriggerReply,))
             assert reply.success
@@ -166,12 +170,12 @@ def test_a_person_drives_and_the_robot_stops_when_the_connection_ends(wire: Wire
 
 
 def test_joints_stop_when_the_connection_ends(wire: Wire, view: Callable[..., str]) -> None:
-    async def seen(foxglove: Any, command: bytes, rate: float) -> None:
+    async def seen(foxglove: Any, command: bytes, rate: float, every: float = 0.1) -> None:
         """Publish a command until it arrives: one that comes too late counts for nothing."""
         async with asyncio.timeout(30):
             while not commands.messages() or commands.messages()[-1].velocity != [rate]:
                 await foxglove.publish(7, command)
-                await asyncio.sleep(0.1)
+                await asyncio.sleep(every)
 
     async def turn(address: str) -> None:
         channel = {"id": 7, "topic": "/joint_command", "encoding": "json", "schemaName": JointState.ROS}
@@ -181,11 +185,37 @@ def test_joints_stop_when_the_connection_ends(wire: Wire, view: Callable[..., st
             async with client(address) as other:  # another client may stop them
                 await other.send(op="advertise", channels=[channel])
                 await seen(other, b'{"header": {"frame_id": "x"}, "name": ["a"], "velocity": [0.0]}', 0.0)
-            await seen(foxglove, b'{"name": ["a"], "velocity": [2.0]}', 2.0)
+            await seen(foxglove, b'{"name": ["a"], "velocity": [2.0]}', 2.0, every=2 * TURN)  # it has to let go
 
     commands = record(wire.bus("watcher"), "joint_command", JointState)
     asyncio.run(turn(view()))
     wait_for(lambda: commands.messages()[-1] == JointState(name=["a"], velocity=[0.0]), what="the stop")
+
+
+def test_a_release_that_waited_in_a_link_does_not_end_a_stop_from_after_it(
+    wire: Wire, view: Callable[..., str]
+) -> None:
+    async def late(link: Proxy, address: str) -> None:
+        async with client(address) as foxglove:
+            services = foxglove.services
+            await foxglove.until(lambda: {"/stop", "/release"} <= services.keys())
+            await foxglove.call(services["/stop"]["id"], EMPTY)
+            await foxglove.until(lambda: foxglove.replies)
+            link.stall()
+            await foxglove.call(services["/release"]["id"], EMPTY)
+            for verb in ("release", "stop"):
+                await asyncio.to_thread(bus.call, verb, TriggerRequest(), TriggerReply)
+            seen = odom.count
+            assert await asyncio.to_thread(odom.wait, seen + 25, 5), "half a second later"
+            link.resume()
+            assert await asyncio.to_thread(odom.wait, odom.count + 25, 5), "half a second later"
+            again = await asyncio.to_thread(wire.bus().call, "stop", TriggerRequest(), TriggerReply)
+            assert again.message.startswith(f"stopped by {bus.source}")
+
+    where, bus = urlsplit(view()), wire.bus("watcher")
+    odom = bus.latest("odom", Odometry)
+    with Proxy(where.port or 0) as link:
+        asyncio.run(late(link, where._replace(netloc=f"127.0.0.1:{link.port}").geturl()))
 
 
 def test_a_view_that_only_looks_takes_nothing(wire: Wire, view: Callable[..., str]) -> None:

@@ -1,12 +1,13 @@
 """The homework: every joint of the rover moves on joint_command, a person comes first, and silence holds still."""
 
+import time
 from collections.abc import Callable
 from functools import partial
 
 import pytest
 
 from holozen import entities
-from holozen.messages import JointState
+from holozen.messages import Header, JointState, Time
 from holozen.testing import Wire, wait_for
 from holozen.transport.pubsub import Publisher
 
@@ -109,6 +110,18 @@ def test_after_a_silence_the_joints_hold_still(rover: Rover, kind: str) -> None:
     rover.robot.status_when(lambda status: not status.obeyed)
     held = rover.still()
     rover.robot.pass_time(1.0)
+    assert rover.newest()[0] == pytest.approx(held, abs=HELD)
+
+
+def test_a_command_with_an_old_stamp_moves_no_joint(rover: Rover) -> None:
+    held, refused = rover.still(), rover.robot.last_status().refused.get("stale", 0)
+    old = JointState(Header(Time.of(time.time() - 1.0)), ["jFL"], velocity=[2.0])
+
+    def is_refused() -> bool:
+        rover.commands.put(old)
+        return bool(rover.robot.last_status().refused.get("stale", 0) > refused + 3)
+
+    wait_for(is_refused, what="the commands to be refused as stale")
     assert rover.newest()[0] == pytest.approx(held, abs=HELD)
 
 

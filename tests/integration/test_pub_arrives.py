@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-from holozen.messages import CommandStatus, JointState, Message, Twist, Wrench
+from holozen.messages import CommandStatus, JointState, Message, PoseStamped, Twist, Wrench
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 
@@ -32,6 +32,18 @@ def test_it_reports_the_number_of_subscribers(town: Wire, robot: Robot) -> None:
     wait_for(reported)  # a busy machine may discover one of them late, or make a single command too old
     output = json.loads(town.run("topic", "pub", "cmd_vel", "{}", "-t", "2", "-w", "2", "--json").stdout)
     assert output == {"key": "cmd_vel", "type": "geometry_msgs/msg/Twist", "subscribers": 2, "published": 2}
+
+
+def test_a_goal_that_is_only_looked_at_is_reported(wire: Wire) -> None:
+    wire.start("topic", "echo", "Fred/goal_pose")
+    done = wire.run("topic", "pub", "Fred/goal_pose", "{}", "--once")
+    assert (done.returncode, done.stdout) == (1, "")
+    why = "no controller reads it, only topic_echo; `holozen controller Fred --laps 0` drives there"
+    assert done.stderr == f"1 subscriber of Fred/goal_pose\nFred/goal_pose: {why}\n"
+    goals = wire.bus("mine").subscribe("Fred/goal_pose", PoseStamped)
+    done = wire.run("topic", "pub", "Fred/goal_pose", "{}", "--once", "-w", "2")
+    assert done.returncode == 0 and done.stderr.endswith("2 subscribers of Fred/goal_pose\n")
+    assert goals.recv().message == PoseStamped()
 
 
 def test_it_waits_for_as_many_subscribers_as_requested(town: Wire, robot: Robot) -> None:

@@ -197,6 +197,15 @@ def test_stamped_commands_drive_with_a_stamp_of_now(town: Wire, robot: Robot, tm
     assert begun - 1 < command.header.stamp.seconds() < time.time() + 1
 
 
+def test_stamped_joint_commands_get_a_stamp_of_now(wire: Wire, tmp_path: Path) -> None:
+    old = codec.encode(JointState(Header(Time(1_700_000_000)), ["arm"], velocity=[1.0]))
+    tap, begun = wire.bus().subscribe_raw("joint_command"), time.time()
+    done = wire.run("replay", bag(tmp_path / "a.mcap", ("joint_command", old, "application/json", 0.0)), "--commands")
+    assert done.returncode == 0, done.stderr
+    command = codec.decode(heard(tap, count=1)[0].payload, "application/json", (JointState,))
+    assert command.velocity == [1.0] and begun - 1 < command.header.stamp.seconds() < time.time() + 1
+
+
 def test_at_the_end_it_names_the_goals_that_still_drive(wire: Wire, tmp_path: Path) -> None:
     goal = codec.encode(PoseStamped())
     done = wire.run("replay", bag(tmp_path / "a.mcap", ("goal_pose", goal, "application/json", 0.0)), "--commands")

@@ -219,6 +219,25 @@ def test_a_command_that_waited_on_its_way_is_left_out(wire: Wire, theirs: "Their
     assert 0.2 not in later
 
 
+def test_a_release_that_waited_on_its_way_ends_no_stop(wire: Wire, theirs: "Theirs") -> None:
+    wire.start("sim").wait_for_line("listens on cmd_vel", 60)
+    joined(wire)
+    wire.bus().call("stop", TriggerRequest(), TriggerReply)
+    wait_for(lambda: "/release" in theirs.services(), what="our service")
+    release = theirs.trigger("/release")
+
+    def asked(sent: float) -> TriggerReply:
+        (reply,) = release.querier.get(payload=b"\0\1\0\0\0", attachment=sample(1, sent).packed())
+        found = reply.ok.payload.to_bytes()
+        answer: TriggerReply = codec.decode(found, "application/cdr;std_srvs/srv/Trigger_Response", (TriggerReply,))
+        return answer
+
+    late = asked(time.time() - 1.0)
+    assert (late.success, late.message[:40]) == (False, "it was sent more than 0.5 s from this ma")
+    assert wire.bus("other").call("stop", TriggerRequest(), TriggerReply).message.startswith("stopped by test@")
+    wait_for(lambda: asked(time.time()).success, what="a release of now to count")
+
+
 def test_first_commands_that_waited_are_left_out_until_their_publisher_keeps_pace(wire: Wire, theirs: "Theirs") -> None:
     """By its clock they are 3 s old, as after a cut link; the clock of a machine may also be wrong by that."""
     gateway = joined(wire)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import sys
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from typing import Any, TypeVar
 
 import pytest
 
+from holozen.background import background
 from holozen.bus import Bus
 from holozen.messages import NextGoalReply, NextGoalRequest, TriggerReply, TriggerRequest
 from holozen.messages.codec import WIRES, encoding
@@ -78,6 +80,33 @@ def test_an_answer_of_a_wrong_type_is_logged_with_both(wire: Wire, capsys: pytes
         wire.bus("caller").call("next_goal", NextGoalRequest(4), NextGoalReply)
     logged = "next_goal: TypeError: its answer is a NextGoalRequest, not a NextGoalReply\n"
     assert capsys.readouterr().err == logged
+
+
+def test_sys_exit_in_a_handler_is_logged_and_the_service_goes_on(
+    wire: Wire, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ends = iter([3])
+
+    def answer(_request: TriggerRequest) -> TriggerReply:
+        for code in ends:
+            sys.exit(code)
+        return TriggerReply(True)
+
+    wire.bus().serve("dock", TriggerRequest, TriggerReply, answer).start()
+    client = wire.bus()
+    with pytest.raises(ServiceError, match=r"^dock: internal error, see the server's log$"):
+        client.call("dock", TriggerRequest(), TriggerReply)
+    assert client.call("dock", TriggerRequest(), TriggerReply).success
+    assert capsys.readouterr().err == "dock: sys.exit(3) in its thread ends nothing; the service goes on\n"
+
+
+def test_sys_exit_in_a_handler_ends_a_loop_that_answers(wire: Wire) -> None:
+    server = wire.bus().serve("dock", TriggerRequest, TriggerReply, lambda _: sys.exit(3))
+    refused = background(lambda: wire.bus().call("dock", TriggerRequest(), TriggerReply))
+    with pytest.raises(SystemExit, match="3"):
+        wait_for(server.answer_pending)
+    with pytest.raises(ServiceError, match="internal error"):
+        refused()
 
 
 def test_an_exception_in_a_handler_is_logged_and_does_not_reach_the_caller(

@@ -12,7 +12,7 @@ from holozen.messages import Header, Odometry, Point, Pose, SceneEntity, Time, T
 from holozen.testing import Wire, wait_for
 from services.view import drive
 from services.view.drive import Driver, Drivers
-from services.view.pad import RESET
+from services.view.pad import OTHER, RESET
 
 STALE_AFTER = 0.2
 
@@ -76,6 +76,26 @@ def test_a_view_that_ends_stops_what_it_drives_and_no_button_counts_from_then_on
     commands = [call.args[0] for call in sent.call_args_list]
     assert commands and set(map(str, commands[commands.index(Twist()) :])) == {str(Twist())}
     assert not driver.is_used()
+
+
+def test_the_speed_is_that_of_the_page_that_drives_and_not_of_one_that_is_refused(wire: Wire) -> None:
+    sim = wire.bus("sim")
+    odom, commands = sim.publisher("odom", Odometry), sim.subscribe("cmd_vel", Twist)
+    driver, seen = Driver(wire.bus("view"), "cmd_vel", "odom"), list[Twist]()
+
+    def hold(page: int, speed: float) -> str:
+        odom.put(Odometry())
+        refusal = driver.hold(page, "forward", (speed, 1.0))
+        driver.publish()
+        seen.extend(received.message for received in iter(commands.try_recv, None) if received.message)
+        return refusal
+
+    wait_for(lambda: not hold(1, 0.5) and seen and seen[-1] == Twist.planar(0.5), what="the first page to drive")
+    assert hold(2, 2.0) == OTHER
+    before = len(seen)
+    wait_for(lambda: hold(2, 2.0) == OTHER and len(seen) > before + 3, what="commands")
+    assert set(map(str, seen[before:])) <= {str(Twist.planar(0.5)), str(Twist())}
+    driver.close()
 
 
 def test_a_button_that_is_held_while_the_robot_is_reset_counts_as_let_go(wire: Wire) -> None:

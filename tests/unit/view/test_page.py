@@ -26,8 +26,11 @@ class Driver:
     def __init__(self) -> None:
         self.pad = Pad()
 
-    def use(self, act: Callable[[Pad, float], Any], _speeds: object = None) -> Any:
+    def use(self, act: Callable[[Pad, float], Any]) -> Any:
         return act(self.pad, 0.0)
+
+    def hold(self, page: int, button: str, _speeds: object) -> str:
+        return self.pad.hold(page, button, 0.0)
 
     def measured(self) -> None:
         return None
