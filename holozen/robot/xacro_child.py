@@ -36,7 +36,7 @@ from holozen.robot.packages import (
     without_home,
 )
 from holozen.robot.sandbox import limit, restrict
-from holozen.robot.xacro import PROCESSOR_TIME, STEP_TIME, Answer, Inputs, XacroFile, answer, unasked, unchanged
+from holozen.robot.xacro import PROCESSOR_TIME, STEP_TIME, Answer, Inputs, XacroFile, answer, current, unasked
 from holozen.suggest import cut, shorten, suggest
 
 # Elements annotated with file and line, in the documents that the library reads and copies.
@@ -438,7 +438,7 @@ class Expansion:
             found = {"error": describe(error, trace, self.path, self.guesses)}
         self._recording = False
         text = found.get("text", "")
-        pure = trace.pure and " at 0x" not in text and unchanged(self.inputs, self.path, self.packages)
+        pure = trace.pure and " at 0x" not in text and current(self.inputs, self.path, self.packages) == self.inputs
         return {**found, "inputs": self.inputs, "pure": pure}
 
     def _library(self, reply: int) -> tuple[Any, Trace]:
