@@ -18,22 +18,19 @@ __all__ = [
 class NotInitializedException(Exception):
     """Something was used before `rclpy.init()`, or after `rclpy.shutdown()`."""
 
-    def __init__(self, *args: object) -> None:
-        super().__init__("call rclpy.init() first; rclpy is not running, or was shut down", *args)
+    __init__ = partialmethod(Exception.__init__, "call rclpy.init() first; rclpy is not running, or was shut down")
 
 
 class NoTypeSupportImportedException(Exception):
     """A type that is neither a message nor a service."""
 
-    def __init__(self, *args: object) -> None:
-        super().__init__("no type support imported", *args)
+    __init__ = partialmethod(Exception.__init__, "no type support imported")
 
 
 class NoImportTypeSupportException(Exception):
     """A type of an interface package that cannot be imported."""
 
-    def __init__(self, *args: object) -> None:
-        super().__init__("no type support to import", *args)
+    __init__ = partialmethod(Exception.__init__, "no type support to import")
 
 
 class ROSInterruptException(Exception):

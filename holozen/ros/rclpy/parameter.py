@@ -15,6 +15,7 @@ from holozen.ros.rclpy.exceptions import (
     InvalidParameterTypeException,
     InvalidParameterValueException,
     ParameterAlreadyDeclaredException,
+    ParameterImmutableException,
     ParameterNotDeclaredException,
 )
 from holozen.ros.rclpy.names import join, key, text_of
@@ -136,9 +137,7 @@ class Parameter:
 
 
 SCALARS: dict[type, str] = {bool: "BOOL", int: "INTEGER", float: "DOUBLE", str: "STRING"}
-LISTS: dict[type, str] = {
-    bytes: "BYTE_ARRAY", bool: "BOOL_ARRAY", int: "INTEGER_ARRAY", float: "DOUBLE_ARRAY", str: "STRING_ARRAY",
-}  # fmt: skip
+LISTS: dict[type, str] = {bytes: "BYTE_ARRAY"} | {kind: f"{name}_ARRAY" for kind, name in SCALARS.items()}
 
 
 def get_parameter_value(string_value: str) -> Any:
@@ -289,6 +288,13 @@ class ParameterStore:
         missing = [name for name in names if name not in self.values]
         if missing and not self.allow_undeclared:
             raise ParameterNotDeclaredException(missing)
+
+    def check_changeable(self, name: str) -> None:
+        """Raises ParameterNotDeclaredException, ParameterImmutableException."""
+        if name not in self.values:
+            raise ParameterNotDeclaredException(name)
+        if self.descriptors[name].read_only:
+            raise ParameterImmutableException(name)
 
     def set(self, parameters: list[Parameter]) -> str:
         """Set all or none; the reason of a rejection, empty if all were set. Raises ParameterNotDeclaredException."""
