@@ -500,8 +500,12 @@ def mecanum_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
     carriers = {joint.parent for joint in joints.values() if joint.kind == "continuous"}
     if all(joints[name].child in carriers for name in corners):
         return _gz_drive(settings, Omni(encoder=True), source)
+    front_left, front_right, back_left, back_right = corners
     wheels = Mecanum(
-        *corners,
+        front_left,
+        front_right,
+        back_left,
+        back_right,
         separation=settings.length("wheel_separation"),
         wheelbase=settings.length("wheelbase"),
         radius=settings.length("wheel_radius"),
