@@ -451,7 +451,8 @@ class Expansion:
         xacro.parse = self._parse(xacro, trace)
         setattr(xacro, "open", self._open)  # noqa: B010
         self._answer_find()
-        setattr(os, "environ", Asked({**dict.fromkeys(self._variables, ""), **os.environ}, self))  # noqa: B010
+        variables = {**dict.fromkeys(self._variables, ""), **os.environ}
+        setattr(os, "environ", Asked(variables, self.record_variable))  # noqa: B010
         sys.addaudithook(self._audit)
         return xacro, trace
 
@@ -468,10 +469,11 @@ class Expansion:
 
     def _expanded(self, library: Any, trace: Trace) -> str:
         self._recording = True
-        arguments = Arguments(self.args)
+        asked = set[str]()
+        arguments = Asked(self.args, lambda name, _: asked.add(name))
         document = library.process_file(str(self.path), mappings=arguments)
         trace.quiet()
-        for warning in unasked(self.path, self.args, arguments.asked):
+        for warning in unasked(self.path, self.args, asked):
             print(warning)
         text = str(document.toprettyxml(indent="  "))
         check_size(len(text), f"{self.path} (expanded)")
@@ -593,34 +595,17 @@ class Expansion:
             self.record("file", str(path))
 
 
-class Arguments(dict[str, str]):
-    """The values of xacro's arguments, which note those that the file declares or reads."""
-
-    def __init__(self, values: Mapping[str, str]) -> None:
-        super().__init__(values)
-        self.asked = set[str]()
-
-    def __getitem__(self, name: str) -> str:
-        value = super().__getitem__(name)
-        self.asked.add(name)
-        return value
-
-    def __contains__(self, name: object) -> bool:
-        self.asked.add(str(name))  # <xacro:arg> asks whether it has to set the default
-        return super().__contains__(name)
-
-
 class Asked(dict[str, str]):
-    """The environment, which reports to the expansion what is read."""
+    """Arguments or environment variables that report each name that is asked for, and whether it has a value."""
 
-    def __init__(self, values: Mapping[str, str], expansion: Expansion) -> None:
+    def __init__(self, values: Mapping[str, str], report: Callable[[str, bool], object]) -> None:
         super().__init__(values)
-        self._expansion = expansion
+        self._report = report
 
     def __getitem__(self, name: str) -> str:
-        self._expansion.record_variable(name, super().__contains__(name))
+        self._report(name, super().__contains__(name))
         return super().__getitem__(name)
 
-    def __contains__(self, name: object) -> bool:
-        self._expansion.record_variable(str(name), super().__contains__(name))
+    def __contains__(self, name: object) -> bool:  # <xacro:arg> asks whether it has to set the default
+        self._report(str(name), super().__contains__(name))
         return super().__contains__(name)
