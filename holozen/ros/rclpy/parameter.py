@@ -67,7 +67,7 @@ class Parameter:
                     if all(_is_a(each, kind) for each in parameter_value):
                         return cls[name]
             raise TypeError(
-                f"{_short(parameter_value)} cannot be the value of a parameter: use a bool, int, float or str, "
+                f"{shorten(repr(parameter_value))} cannot be the value of a parameter: use a bool, int, float or str, "
                 "or a list of one of them"
             )
 
@@ -89,7 +89,7 @@ class Parameter:
             raise TypeError(f"parameter {name!r}: type_ must be a Parameter.Type, not {article(type(type_).__name__)}")
         if not type_.check(value):
             got = Parameter.Type.from_parameter_value(value)
-            raise ValueError(f"parameter {name!r}: {_short(value)} is {got.name}, but its type is {type_.name}")
+            raise ValueError(f"parameter {name!r}: {shorten(repr(value))} is {got.name}, but its type is {type_.name}")
         self._name, self._type_, self._value = name, type_, value
 
     @classmethod
@@ -197,10 +197,6 @@ def _plain(value: Any) -> Any:
 
 def _is_a(value: object, kind: type) -> bool:
     return isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
-
-
-def _short(value: object) -> str:
-    return shorten(repr(value))
 
 
 TOLERANCE = 1e-9  # of the steps of a range: decimal fractions are not exact in binary
