@@ -12,7 +12,7 @@ import pickle
 import re
 import signal
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib.util import find_spec
 from itertools import groupby
 from pathlib import Path
@@ -497,10 +497,9 @@ class Expansion:
     def _elsewhere(self, path: str, library: Any) -> str:
         """The file to include instead of one from another machine: a file of the robot with the same name, if any."""
         self.record("file", path)  # used as soon as it exists
-        self._recording = False
-        matches = find_by_name(path, self.path, self.packages)
-        instead = portable_name(matches[0], self.path, self.packages) if matches else ""
-        self._recording = True
+        with self._unrecorded():
+            matches = find_by_name(path, self.path, self.packages)
+            instead = portable_name(matches[0], self.path, self.packages) if matches else ""
         if not matches:
             return path
         library.warning(instead_of(path, matches, "included", instead))
@@ -536,9 +535,15 @@ class Expansion:
         return self.path.absolute().parent
 
     def _is_known(self, path: str, *more: Path) -> bool:
-        recording, self._recording = self._recording, False  # the package.xml files read on the way are not inputs
-        try:
+        with self._unrecorded():
             return lies_in(path, [*known_folders(self.path, self.packages), *without_home(more)])
+
+    @contextlib.contextmanager
+    def _unrecorded(self) -> Iterator[None]:
+        """What is read in this block, such as package.xml files, is no input."""
+        recording, self._recording = self._recording, False
+        try:
+            yield
         finally:
             self._recording = recording
 
@@ -561,22 +566,18 @@ class Expansion:
 
     def find(self, name: str) -> str:
         """The folder of a package."""
-        self._recording = False  # the package.xml files read on the way are not inputs: the answer is
-        try:
+        with self._unrecorded():  # the answer is the input
             folder = find_package(name, self.path, self.packages)
             if find_named(name, self.path, self.packages) is None:
                 self.guesses[name] = folder
-        finally:
-            self._recording = True
         self.inputs["find"][name] = str(folder)
         return str(folder)
 
     def record(self, kind: str, asked: str) -> Answer:
         """Record the current value of `asked` at its first use."""
         if asked not in self.inputs[kind]:
-            recording, self._recording = self._recording, False
-            self.inputs[kind][asked] = answer(kind, asked, self.path, self.packages)
-            self._recording = recording
+            with self._unrecorded():
+                self.inputs[kind][asked] = answer(kind, asked, self.path, self.packages)
         return self.inputs[kind][asked]
 
     def _audit(self, event: str, args: tuple[Any, ...]) -> None:
