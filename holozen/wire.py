@@ -192,9 +192,14 @@ def _topic_row(row: Topic) -> str:
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 
 
+def is_robot_name(text: str) -> bool:
+    """Whether `text` may name a robot."""
+    return _NAME.fullmatch(text) is not None
+
+
 def robot_name(text: str) -> str:
     """`text` if it may name a robot, else ValueError. Zenoh would accept `*`, which drives every robot."""
-    if not _NAME.fullmatch(text):
+    if not is_robot_name(text):
         raise ValueError(
             f"robot name {text[:80]!r}: use a letter, then up to 63 letters, digits, '_' or '-' (such as Fred)"
         )

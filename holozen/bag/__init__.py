@@ -3,9 +3,12 @@
 from typing import NamedTuple
 
 from holozen.console import Failure
+from holozen.messages import WIRES
 
 ENCODING = "zenoh_encoding"
 """The key in a channel's metadata that holds the Zenoh Encoding."""
+ZENOH = {**WIRES, "protobuf": "application/protobuf"}
+"""MCAP's message encoding -> Zenoh's Encoding."""
 
 
 class BagError(Failure):

@@ -14,12 +14,13 @@ from typing import Any, NamedTuple
 import msgspec
 
 from holozen import wire
+from holozen.bag import ZENOH
 from holozen.messages import Message, codec, encoding_of
 from holozen.messages.definitions import MAPPED, Interface, InterfaceError, whole_text
 from holozen.messages.registry import Registry
 from holozen.transport.graph import is_latched
 
-_MCAP = {"application/msgpack": "msgpack", "application/cdr": "cdr", "application/protobuf": "protobuf"}
+_MCAP = {encoding: name for name, encoding in ZENOH.items()}
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 _JSON_TYPES = {"bool": "boolean", "string": "string", "wstring": "string", "float32": "number", "float64": "number"}
 

@@ -14,15 +14,12 @@ from mcap.records import Message as MessageRecord
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk, read_magic
 from mcap.writer import MCAP0_MAGIC
 
-from holozen.bag import ENCODING, BagError, Channel, Message
+from holozen.bag import ENCODING, ZENOH, BagError, Channel, Message
 from holozen.messages import encoding_of
 
 LARGEST = 256 << 20  # bytes of a record, compressed and uncompressed
 NAMES = 64 << 20  # bytes of all schemas and channels of a file
 LIBRARY = "holozen"
-# The Encodings of MCAP's message encodings, for bags of other programs, which note no Zenoh Encoding.
-_ZENOH = {"json": "application/json", "msgpack": "application/msgpack",
-    "protobuf": "application/protobuf", "": "zenoh/bytes"}  # fmt: skip
 
 
 class McapFile:
@@ -147,6 +144,8 @@ def _decompressed(data: bytes, compression: str, size: int) -> bytes:
 def _channel(record: ChannelRecord, types: dict[int, str]) -> Channel:
     form = record.message_encoding
     kind = record.metadata.get("type") or types.get(record.schema_id, "")
-    encoding = record.metadata.get(ENCODING) or (encoding_of("cdr", kind) if form == "cdr" else _ZENOH.get(form, form))
+    encoding = record.metadata.get(ENCODING)
+    if not encoding:  # of another program
+        encoding = encoding_of("cdr", kind) if form == "cdr" else ZENOH.get(form, form or "zenoh/bytes")
     # Topics of ROS begin with a slash, keys of Zenoh do not.
     return Channel(record.topic.removeprefix("/"), encoding, form, kind)

@@ -15,7 +15,7 @@ from holozen.cli.verb import Verb, by_name
 from holozen.console import report
 from holozen.process import stop_event
 from holozen.robot.errors import RobotError
-from holozen.robot.xacro import SAVED, Inputs, Outcome, XacroFile, current, expand_xacro, process, unchanged
+from holozen.robot.xacro import SAVED, Inputs, Outcome, XacroFile, current, expand_xacro, process
 from holozen.transport import connection
 from holozen.transport.errors import BusError
 
@@ -140,7 +140,7 @@ def _report(args: argparse.Namespace, text: str, done: bool) -> None:
 
 def _wait_for_save(inputs: Inputs, path: Path, packages: Mapping[str, Path], stop: threading.Event) -> None:
     saved = {kind: answers for kind, answers in inputs.items() if kind in SAVED}
-    while unchanged(saved, path, packages) and not stop.wait(LOOK):
+    while current(saved, path, packages) == saved and not stop.wait(LOOK):
         pass
     while (latest := current(saved, path, packages)) != saved and not stop.wait(SETTLED):
         saved = latest

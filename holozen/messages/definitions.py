@@ -351,7 +351,7 @@ def completed(interface: Interface, value: Any, path: str = "", tolerant: bool =
     infinities are numbers. A mapping stands for a list of pairs.
     """
     if not isinstance(value, dict):
-        raise InterfaceError(f"{path or interface.name}: {_shown(value)} is not a mapping of fields")
+        raise InterfaceError(f"{path or interface.name}: {shorten(repr(value))} is not a mapping of fields")
     names = [field.name for field in interface.fields]
     for name in value:
         if name not in names and not tolerant:
@@ -411,7 +411,7 @@ def _checked(field: Field, value: Any, path: str, tolerant: bool) -> Any:
     if isinstance(value, dict) and (names := _pair(field)):
         value = [dict(zip(names, item, strict=True)) for item in value.items()]
     if not isinstance(value, list | tuple):
-        raise InterfaceError(f"{path}: {_shown(value)} is not a list")
+        raise InterfaceError(f"{path}: {shorten(repr(value))} is not a list")
     if not fits_length(field, len(value)):
         raise InterfaceError(f"{path}: {len(value)} values for {field.spelled()}")
     return [_element(field, inner, f"{path}[{index}]", tolerant) for index, inner in enumerate(value)]
@@ -427,7 +427,7 @@ def _element(field: Field, value: Any, path: str, tolerant: bool) -> Any:
         return completed(field.nested, value, path, tolerant)
     if _fits(field, value):
         return float(value) if field.type in FLOATS else value
-    raise InterfaceError(f"{path}: {_shown(value)} is not a valid {field._replace(array='').spelled()}")
+    raise InterfaceError(f"{path}: {shorten(repr(value))} is not a valid {field._replace(array='').spelled()}")
 
 
 def _fits(field: Field, value: Any) -> bool:
@@ -451,10 +451,6 @@ def _is_number(kind: str, value: float) -> bool:
 
 def _is_unicode(text: str) -> bool:
     return not any("\ud800" <= letter <= "\udfff" for letter in text)
-
-
-def _shown(value: Any) -> str:
-    return shorten(repr(value))
 
 
 SEPARATOR = "=" * 80  # between two definitions

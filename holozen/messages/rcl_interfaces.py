@@ -16,14 +16,9 @@ WORDS = (
 )  # fmt: skip
 """Names of the types of ParameterType, in their order."""
 
-_FIELDS = (
-    "", "bool_value", "integer_value", "double_value", "string_value", "byte_array_value", "bool_array_value",
-    "integer_array_value", "double_array_value", "string_array_value",
-)  # fmt: skip
-
 
 class ParameterValue(Message):
-    """A value, in the field for its `type`."""
+    """A value, in the field for its `type`: the fields are in the order of the types."""
 
     type: UInt8 = NOT_SET
     bool_value: bool = False
@@ -42,7 +37,7 @@ class ParameterValue(Message):
         if isinstance(value, list):
             kind = BYTE_ARRAY if not value else BOOL_ARRAY + cls.of(value[0]).type - BOOL
             made = cls(kind)
-            setattr(made, _FIELDS[kind], value)
+            setattr(made, cls.__struct_fields__[kind], value)
             return made
         if isinstance(value, bool):
             return cls(BOOL, bool_value=value)
@@ -54,7 +49,8 @@ class ParameterValue(Message):
 
     def plain(self) -> object:
         """The value; None if there is none."""
-        return getattr(self, _FIELDS[self.type]) if NOT_SET < self.type < len(_FIELDS) else None
+        fields = self.__struct_fields__
+        return getattr(self, fields[self.type]) if NOT_SET < self.type < len(fields) else None
 
 
 class Parameter(Message):

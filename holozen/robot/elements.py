@@ -113,10 +113,7 @@ class Tag:
             return default
         if not self.sdf:
             return self._parsed(f"{self} {name}", self.word(name), count, most)
-        child = self.first(name)
-        if child is None:
-            raise self.wrong(f"has no <{name}>")
-        return child.content(count, most)
+        return self.needed(name).content(count, most)
 
     def number(self, name: str, default: float | None = None, most: float = LARGEST) -> float:
         """A value of one number, from -`most` to `most`."""

@@ -347,7 +347,7 @@ def planar_move(settings: Settings, joints: Joints, source: Source) -> Drive:
     return _ros_drive(settings, Planar())
 
 
-def omni_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
+def omni_drive(settings: Settings) -> Drive:
     """holozen's own: the robot's own wheels, with free rollers on their rims. Its tags are those of planar_move, and
     odometry_source.
     """
@@ -513,7 +513,7 @@ def mecanum_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
     return _gz_drive(settings, wheels, source)
 
 
-def with_publisher(drive: Drive, settings: Settings, source: Source) -> Drive:
+def with_publisher(drive: Drive, settings: Settings) -> Drive:
     """The drive with the odometry of an OdometryPublisher, which is the true pose."""
     wheels = drive.mechanism
     if isinstance(wheels, Differential | Mecanum | Omni):
@@ -722,14 +722,14 @@ def read_plugins(
     if wheels:
         if drive and not isinstance(drive.mechanism, Planar):
             raise wheels.wrong(f"is a second drive beside {cut(kind_of(driver))}; use it with planar_move, or alone")
-        found = omni_drive(Settings(wheels), joints, source)
+        found = omni_drive(Settings(wheels))
         drive, driver = (replace(drive, mechanism=found.mechanism), driver) if drive else (found, wheels)
     if drive is None:
         for plugin in publishers:
             source.warn(plugin, "publishes odometry, but the robot has no drive")
         return None
     for plugin in publishers:
-        drive, driver = with_publisher(drive, Settings(plugin), source), plugin
+        drive, driver = with_publisher(drive, Settings(plugin)), plugin
     return _with_known_frame(drive, driver, links, root, source)
 
 

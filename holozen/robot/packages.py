@@ -39,8 +39,11 @@ def find_named(name: str, start: Path, given: Mapping[str, Path] = {}) -> Path |
     """As `find_package`, without its last resort; None if no folder is known to be this package."""
     if not PACKAGE_NAME.fullmatch(name):
         raise RobotError(f"{start}: {cut(name)} is not a package name; a name has letters, digits, '_' and '-' only")
-    if name in given:
-        return _given_folder(name, given[name])
+    if folder := given.get(name):
+        if not os.path.isdir(folder):
+            problem = f"--package {name}={folder}: there is no such folder"
+            raise RobotError(f"{problem}; give the folder of package {cut(name)}")
+        return folder
     shared = (prefix / "share" / name for prefix in folders_listed("AMENT_PREFIX_PATH"))
     found = next((folder for folder in shared if os.path.isdir(folder)), None)
     return found or _named(name, folders_listed("ROS_PACKAGE_PATH")) or _named(name, folders_above(start))
@@ -107,12 +110,6 @@ def _folders_in(folder: Path) -> list[Path]:
     except OSError:
         return []
     return [folder / name for name in sorted(names)]
-
-
-def _given_folder(name: str, folder: Path) -> Path:
-    if not os.path.isdir(folder):
-        raise RobotError(f"--package {name}={folder}: there is no such folder; give the folder of package {cut(name)}")
-    return folder
 
 
 def _is_shared(folder: Path) -> bool:

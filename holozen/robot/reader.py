@@ -63,9 +63,6 @@ class _Reply(NamedTuple):
 class _Asked(BaseException):
     """A question to the parent process. Not an Exception, so that no parser takes it for one of its own."""
 
-    def __init__(self, *question: Any) -> None:
-        self.question = question
-
 
 # In the parent process.
 
@@ -294,7 +291,7 @@ def _work(request: bytes, end: int) -> NoReturn:
     try:
         reply = _Reply(lacks=lacks, value=msgspec.msgpack.encode(function(*args), enc_hook=str))  # str of a Path
     except _Asked as asked:
-        reply = _Reply(lacks=lacks, asked=[*asked.question])
+        reply = _Reply(lacks=lacks, asked=[*asked.args])
     except RobotError as error:
         reply = _Reply(lacks=lacks, error=str(error))
     except UnicodeEncodeError:

@@ -215,8 +215,17 @@ def assemble(model: RobotModel) -> list[Part]:
     """The parts, every parent before its children, the root's first. A joint that moves no mass is treated as fixed."""
     above = {joint.child: joint for joint in model.joints.values()}
     tops, within = _grouped(model, above)
-    order = list(within)
-    return [_part(model, top, within, tops, order, above) for top in order]
+    order, parts = list(within), list[Part]()
+    for top, links in within.items():
+        body, surface = lump_links(model, links), _surface(model, links)
+        if top == model.root:
+            parts.append(Part(top, body, surface))
+            continue
+        joint = above[top]
+        carrier = tops[joint.parent]
+        frame = within[carrier][joint.parent] @ Frame.of(joint.pose)
+        parts.append(Part(top, body, surface, joint, order.index(carrier), frame.xyz, frame.quaternion))
+    return parts
 
 
 def in_parts(model: RobotModel) -> dict[str, tuple[int, Frame]]:
@@ -295,23 +304,6 @@ def _moving(model: RobotModel, above: dict[str, Joint]) -> set[str]:
         else:
             masses[above[name].parent] += masses[name]
     return found
-
-
-def _part(
-    model: RobotModel,
-    top: str,
-    within: dict[str, dict[str, Frame]],
-    tops: dict[str, str],
-    order: list[str],
-    above: dict[str, Joint],
-) -> Part:
-    body, surface = lump_links(model, within[top]), _surface(model, within[top])
-    if top == model.root:
-        return Part(top, body, surface)
-    joint = above[top]
-    carrier = tops[joint.parent]
-    frame = within[carrier][joint.parent] @ Frame.of(joint.pose)
-    return Part(top, body, surface, joint, order.index(carrier), frame.xyz, frame.quaternion)
 
 
 def _surface(model: RobotModel, links: dict[str, Frame]) -> Surface:

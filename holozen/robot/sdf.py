@@ -154,27 +154,22 @@ def read_shape(tag: Tag, frame: Pose, source: Source) -> Shape | None:
     A capsule, a cone and an ellipsoid become the hull of points on their surface, at most 2 % smaller in cross-section.
     """
     pose = compose(frame, read_pose(tag).pose)
-    geometry = geometry_of(tag, SIZES, (*UNSUPPORTED, "empty"))
+    shape = geometry_of(tag, SIZES, (*UNSUPPORTED, "empty"))
     color = _color(tag, source) if tag.name == "visual" else None
-    return _shape(geometry, tag.name, pose, color, source)
-
-
-def _shape(tag: Tag, use: str, pose: Pose, color: Color | None, source: Source) -> Shape | None:
-    if tag.name == "empty":
+    if shape.name == "empty":
         return None
-    if tag.name in UNSUPPORTED:
-        source.warn(tag, f"({use}) is left out; use {tags(SIZES)} or <mesh>")
+    if shape.name in UNSUPPORTED:
+        source.warn(shape, f"({tag.name}) is left out; use {tags(SIZES)} or <mesh>")
         return None
-    if tag.name == "mesh":
-        return _mesh(tag, use, pose, color, source)
-    if tag.name == "plane":
-        return Shape(
-            "plane", read_size(tag, (1.0, 1.0)), compose(pose, _upon(tag.direction("normal", UP))), color=color
-        )
-    size = read_size(tag)
-    if tag.name in SHAPES:
-        return Shape(tag.name, size, pose, color=color)
-    return Shape("hull", (), pose, color=color, points=tuple(_HULLS[tag.name](size)))
+    if shape.name == "mesh":
+        return _mesh(shape, tag.name, pose, color, source)
+    if shape.name == "plane":
+        upon = compose(pose, _upon(shape.direction("normal", UP)))
+        return Shape("plane", read_size(shape, (1.0, 1.0)), upon, color=color)
+    size = read_size(shape)
+    if shape.name in SHAPES:
+        return Shape(shape.name, size, pose, color=color)
+    return Shape("hull", (), pose, color=color, points=tuple(_HULLS[shape.name](size)))
 
 
 def _upon(normal: Vector) -> Pose:
@@ -452,9 +447,8 @@ class Includes:
         for tag in outer.tag.children:
             if tag.name not in ("model", "include"):
                 continue
-            piece: Piece | None = replace(outer, tag=tag)
-            if tag.name == "include":
-                piece = self.included(replace(outer, tag=tag))
+            own = replace(outer, tag=tag)
+            piece = self.included(own) if tag.name == "include" else own
             self._count(piece.tag if piece else tag)
             if piece is not None:
                 yield piece

@@ -42,7 +42,7 @@ WORLD = "world"  # the frame of contacts, unless a link is tagged
 RAYS = ("ray", "gpu_ray", "lidar", "gpu_lidar")
 CAMERAS = ("camera", "depth", "depth_camera", "rgbd_camera", "rgbd")
 SIMULATED = (*RAYS, "sonar", "imu", "contact", *CAMERAS)
-RATES = {"scan": 10.0, "points": 10.0, "range": 10.0, "imu": 100.0, "contact": 50.0, "camera": 10.0}  # Hz
+RATES: dict[type, float] = {Lidar: 10.0, Imu: 100.0, Bumper: 50.0, Camera: 10.0}  # Hz
 
 
 def read_sensors(robot: Tag, links: Mapping[str, Link], names: Iterable[str], source: Source) -> list[Sensor]:
@@ -143,7 +143,7 @@ class _Reading:
         devices = _devices(sensor)
         pose, frame, mount = self._placed(sensor, link)
         for topic, device in devices:
-            yield Sensor(sensor.name, link, pose, frame, mount, topic, sensor.rate(_rate_of(device)), device)
+            yield Sensor(sensor.name, link, pose, frame, mount, topic, sensor.rate(RATES[type(device)]), device)
 
     def _placed(self, sensor: "_SensorTag", link: str) -> tuple[Pose, str, Pose | None]:
         """The pose of a sensor on a link; the name of the frame of its messages: a tagged one, that of the link, or one
@@ -171,7 +171,7 @@ class _Reading:
             raise settings.tag("body_name").wrong(f"is {cut(link)}, which names no link{known}")
         noise = Noise(stddev=settings.number(0.0, "gaussian_noise"))
         name = plugin.attributes.get("name", "").strip() or "imu"
-        rate = settings.number(0.0, "update_rate", most=FASTEST) or RATES["imu"]
+        rate = settings.number(0.0, "update_rate", most=FASTEST) or RATES[Imu]
         return Sensor(
             name, link, HERE, link, None, settings.topic("imu", "topic_name"), rate, Imu((noise,) * 3, (noise,) * 3)
         )
@@ -226,17 +226,6 @@ def _devices(sensor: _SensorTag) -> list[tuple[str, Lidar | Imu | Bumper | Camer
     if lidar.vertical.count > 1 and not sensor.plugin_kind and sensor.kind != "sonar":  # gz-sim publishes both
         return [(topic, lidar), (f"{topic}/points", structs.replace(lidar, message="points"))]
     return [(topic, lidar)]
-
-
-def _rate_of(device: Lidar | Imu | Bumper | Camera) -> float:
-    match device:
-        case Lidar():
-            return RATES[device.message]
-        case Imu():
-            return RATES["imu"]
-        case Bumper():
-            return RATES["contact"]
-    return RATES["camera"]
 
 
 def _pose(sensor: _SensorTag) -> Pose:

@@ -95,12 +95,6 @@ def current(inputs: Inputs, start: Path, packages: Mapping[str, Path]) -> Inputs
     }
 
 
-def unchanged(inputs: Inputs, start: Path, packages: Mapping[str, Path]) -> bool:
-    """Whether each input still has the recorded value."""
-    recorded = ((kind, asked, value) for kind, answers in inputs.items() for asked, value in answers.items())
-    return all(answer(kind, asked, start, packages) == value for kind, asked, value in recorded)
-
-
 def unasked(path: Path, given: Collection[str], asked: Collection[str] = ()) -> tuple[str, ...]:
     """A warning for each argument that is `given` to a file and not among those that it has `asked` for. Xacro ignores
     them, so that a misspelt one would be the default.
@@ -317,7 +311,7 @@ def process(file: XacroFile) -> Outcome:
     read_text(file.path)
     key = _key(file)
     entry = load_cached(key)
-    if entry and unchanged(entry["inputs"], file.path, file.packages):
+    if entry and current(entry["inputs"], file.path, file.packages) == entry["inputs"]:
         return Outcome(entry["text"], "", entry["inputs"], tuple(entry["warnings"]), True)
     outcome = expand_in_child(file)
     if outcome.pure and not outcome.error:

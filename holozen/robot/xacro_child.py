@@ -12,7 +12,7 @@ import pickle
 import re
 import signal
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib.util import find_spec
 from itertools import groupby
 from pathlib import Path
@@ -36,7 +36,7 @@ from holozen.robot.packages import (
     without_home,
 )
 from holozen.robot.sandbox import limit, restrict
-from holozen.robot.xacro import PROCESSOR_TIME, STEP_TIME, Answer, Inputs, XacroFile, answer, unasked, unchanged
+from holozen.robot.xacro import PROCESSOR_TIME, STEP_TIME, Answer, Inputs, XacroFile, answer, current, unasked
 from holozen.suggest import cut, shorten, suggest
 
 # Elements annotated with file and line, in the documents that the library reads and copies.
@@ -452,7 +452,7 @@ class Expansion:
             found = {"error": describe(error, trace, self.path, self.guesses)}
         self._recording = False
         text = found.get("text", "")
-        pure = trace.pure and " at 0x" not in text and unchanged(self.inputs, self.path, self.packages)
+        pure = trace.pure and " at 0x" not in text and current(self.inputs, self.path, self.packages) == self.inputs
         return {**found, "inputs": self.inputs, "pure": pure}
 
     def _library(self, reply: int) -> tuple[Any, Trace]:
@@ -465,7 +465,8 @@ class Expansion:
         xacro.parse = self._parse(xacro, trace)
         setattr(xacro, "open", self._open)  # noqa: B010
         self._answer_find()
-        setattr(os, "environ", Asked({**dict.fromkeys(self._variables, ""), **os.environ}, self))  # noqa: B010
+        variables = {**dict.fromkeys(self._variables, ""), **os.environ}
+        setattr(os, "environ", Asked(variables, self.record_variable))  # noqa: B010
         sys.addaudithook(self._audit)
         return xacro, trace
 
@@ -482,10 +483,11 @@ class Expansion:
 
     def _expanded(self, library: Any, trace: Trace) -> str:
         self._recording = True
-        arguments = Arguments(self.args)
+        asked = set[str]()
+        arguments = Asked(self.args, lambda name, _: asked.add(name))
         document = library.process_file(str(self.path), mappings=arguments)
         trace.quiet()
-        for warning in unasked(self.path, self.args, arguments.asked):
+        for warning in unasked(self.path, self.args, asked):
             print(warning)
         text = str(document.toprettyxml(indent="  "))
         check_size(len(text), f"{self.path} (expanded)")
@@ -509,10 +511,9 @@ class Expansion:
     def _elsewhere(self, path: str, library: Any) -> str:
         """The file to include instead of one from another machine: a file of the robot with the same name, if any."""
         self.record("file", path)  # used as soon as it exists
-        self._recording = False
-        matches = find_by_name(path, self.path, self.packages)
-        instead = portable_name(matches[0], self.path, self.packages) if matches else ""
-        self._recording = True
+        with self._unrecorded():
+            matches = find_by_name(path, self.path, self.packages)
+            instead = portable_name(matches[0], self.path, self.packages) if matches else ""
         if not matches:
             return path
         library.warning(instead_of(path, matches, "included", instead))
@@ -548,9 +549,15 @@ class Expansion:
         return self.path.absolute().parent
 
     def _is_known(self, path: str, *more: Path) -> bool:
-        recording, self._recording = self._recording, False  # the package.xml files read on the way are not inputs
-        try:
+        with self._unrecorded():
             return lies_in(path, [*known_folders(self.path, self.packages), *without_home(more)])
+
+    @contextlib.contextmanager
+    def _unrecorded(self) -> Iterator[None]:
+        """What is read in this block, such as package.xml files, is no input."""
+        recording, self._recording = self._recording, False
+        try:
+            yield
         finally:
             self._recording = recording
 
@@ -573,22 +580,18 @@ class Expansion:
 
     def find(self, name: str) -> str:
         """The folder of a package."""
-        self._recording = False  # the package.xml files read on the way are not inputs: the answer is
-        try:
+        with self._unrecorded():  # the answer is the input
             folder = find_package(name, self.path, self.packages)
             if find_named(name, self.path, self.packages) is None:
                 self.guesses[name] = folder
-        finally:
-            self._recording = True
         self.inputs["find"][name] = str(folder)
         return str(folder)
 
     def record(self, kind: str, asked: str) -> Answer:
         """Record the current value of `asked` at its first use."""
         if asked not in self.inputs[kind]:
-            recording, self._recording = self._recording, False
-            self.inputs[kind][asked] = answer(kind, asked, self.path, self.packages)
-            self._recording = recording
+            with self._unrecorded():
+                self.inputs[kind][asked] = answer(kind, asked, self.path, self.packages)
         return self.inputs[kind][asked]
 
     def _audit(self, event: str, args: tuple[Any, ...]) -> None:
@@ -607,34 +610,17 @@ class Expansion:
             self.record("file", str(path))
 
 
-class Arguments(dict[str, str]):
-    """The values of xacro's arguments, which note those that the file declares or reads."""
-
-    def __init__(self, values: Mapping[str, str]) -> None:
-        super().__init__(values)
-        self.asked = set[str]()
-
-    def __getitem__(self, name: str) -> str:
-        value = super().__getitem__(name)
-        self.asked.add(name)
-        return value
-
-    def __contains__(self, name: object) -> bool:
-        self.asked.add(str(name))  # <xacro:arg> asks whether it has to set the default
-        return super().__contains__(name)
-
-
 class Asked(dict[str, str]):
-    """The environment, which reports to the expansion what is read."""
+    """Arguments or environment variables that report each name that is asked for, and whether it has a value."""
 
-    def __init__(self, values: Mapping[str, str], expansion: Expansion) -> None:
+    def __init__(self, values: Mapping[str, str], report: Callable[[str, bool], object]) -> None:
         super().__init__(values)
-        self._expansion = expansion
+        self._report = report
 
     def __getitem__(self, name: str) -> str:
-        self._expansion.record_variable(name, super().__contains__(name))
+        self._report(name, super().__contains__(name))
         return super().__getitem__(name)
 
-    def __contains__(self, name: object) -> bool:
-        self._expansion.record_variable(str(name), super().__contains__(name))
+    def __contains__(self, name: object) -> bool:  # <xacro:arg> asks whether it has to set the default
+        self._report(str(name), super().__contains__(name))
         return super().__contains__(name)

@@ -6,6 +6,7 @@ of 24 orders of Euler angles: "s" for static, "r" for rotating axes, then their 
 
 import math
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -164,10 +165,7 @@ def compose_matrix(
 
 def concatenate_matrices(*matrices: Any) -> Array:
     """The product: the last matrix acts first."""
-    product = identity_matrix()
-    for matrix in matrices:
-        product = product @ np.asarray(matrix, dtype=float)
-    return product
+    return reduce(np.matmul, (np.asarray(matrix, dtype=float) for matrix in matrices), identity_matrix())
 
 
 def inverse_matrix(matrix: Any) -> Array:

@@ -10,6 +10,7 @@ from holozen import flags
 from holozen.console import report
 from holozen.suggest import listed
 from holozen.transport import connection
+from holozen.transport.errors import BusError
 
 if TYPE_CHECKING:
     from holozen.bus import Bus
@@ -79,32 +80,27 @@ def main(argv: list[str] | None = None) -> int:
     try:
         args = parse(parser(), sys.argv[1:] if argv is None else argv, path())
         layout = load(args.keys)
-    except InputError as error:
+        args.robots = [*args.robot, *args.robots]
+        if problem := _unusable(args):
+            raise InputError(problem)
+        return read_script(args, layout) if args.script is not None else drive(args, layout)
+    except (InputError, BusError) as error:
         report(f"teleop: {error}")
-        return 2
-    args.robots = [*args.robot, *args.robots]
+        return 2 if isinstance(error, InputError) else 1
+
+
+def _unusable(args: argparse.Namespace) -> str:
+    """Why the flags do not go together, or not with where it runs; empty if they do."""
     if args.deadman and (args.script is not None or latches(args)):
-        report("teleop: --deadman needs keys that are held, so neither --script nor --mode latch; or give --no-deadman")
-        return 2
+        return "--deadman needs keys that are held, so neither --script nor --mode latch; or give --no-deadman"
     if args.script is not None and len(set(args.robots)) > 1:
-        report(f"teleop: a script drives one robot, so name one of {listed(args.robots)}")
-        return 2
+        return f"a script drives one robot, so name one of {listed(args.robots)}"
     if args.script is None and not (sys.stdin.isatty() and sys.stdout.isatty()):
         from holozen.wire import key_for
 
         key = args.cmd_vel or key_for("cmd_vel", args.robots[0] if args.robots else "")
-        report(f"teleop: needs a terminal for its keys; without one: --script FILE, or {WITHOUT.format(key=key)}")
-        return 2
-    from holozen.transport.errors import BusError
-
-    try:
-        return read_script(args, layout) if args.script is not None else drive(args, layout)
-    except InputError as error:
-        report(f"teleop: {error}")
-        return 2
-    except BusError as error:
-        report(f"teleop: {error}")
-        return 1
+        return f"needs a terminal for its keys; without one: --script FILE, or {WITHOUT.format(key=key)}"
+    return ""
 
 
 def latches(args: argparse.Namespace) -> bool:

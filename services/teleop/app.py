@@ -88,28 +88,25 @@ class TeleopApp:
 
     def run(self) -> None:
         """Drive. The caller has to stop the robot at the end, even if this raises."""
-        for number in ENDS:
-            signal.signal(number, self._end)
-        signal.signal(signal.SIGTSTP, self._suspend)
-        signal.signal(signal.SIGCONT, self._continue)
+        for number in (*ENDS, signal.SIGTSTP, signal.SIGCONT):
+            signal.signal(number, self._take_signal)
         asyncio.run(self._run())
         if self._error is not None:
             raise self._error
 
     async def _run(self) -> None:
-        self._loop = asyncio.get_running_loop()
-        self._loop.set_exception_handler(self._fail)
+        loop = self._loop = asyncio.get_running_loop()
+        loop.set_exception_handler(self._fail)
+
+        def begin() -> None:
+            loop.call_soon(self._attach)  # once prompt_toolkit has begun to read
+
         try:
-            await self._app.run_async(pre_run=self._begin, set_exception_handler=False, handle_sigint=False)
+            await self._app.run_async(pre_run=begin, set_exception_handler=False, handle_sigint=False)
         finally:
             self._loop = None
             if self._timer:
                 self._timer.cancel()
-
-    def _begin(self) -> None:
-        """Called once prompt_toolkit has begun to read: let the loop start the rest."""
-        assert self._loop is not None
-        self._loop.call_soon(self._attach)
 
     def _attach(self) -> None:
         assert self._loop is not None
@@ -291,7 +288,7 @@ class TeleopApp:
         self._terminal.leave()
         signal.signal(signal.SIGTSTP, signal.SIG_DFL)
         os.killpg(os.getpgrp(), signal.SIGTSTP)  # the whole group, since the shell waits for our parent too
-        signal.signal(signal.SIGTSTP, self._suspend)
+        signal.signal(signal.SIGTSTP, self._take_signal)
         self._suspended, self._is_continued = False, True
 
     def _resize(self) -> None:
@@ -318,20 +315,14 @@ class TeleopApp:
         """End with an exception that was raised in the loop."""
         self._finish(context.get("exception") or RuntimeError(context.get("message")))
 
-    def _end(self, _number: int, _frame: FrameType | None) -> None:
-        self._ended = True
-        self._wake()
-
-    def _suspend(self, _number: int, _frame: FrameType | None) -> None:
-        self._suspended = True
-        self._wake()
-
-    def _continue(self, _number: int, _frame: FrameType | None) -> None:
-        self._is_continued = True
-        self._wake()
-
-    def _wake(self) -> None:
-        """Wake the loop from a signal handler."""
+    def _take_signal(self, number: int, _frame: FrameType | None) -> None:
+        """Note a signal, and wake the loop."""
+        if number == signal.SIGTSTP:
+            self._suspended = True
+        elif number == signal.SIGCONT:
+            self._is_continued = True
+        else:
+            self._ended = True
         if self._loop is not None:
             self._loop.call_soon_threadsafe(self._pass)
 

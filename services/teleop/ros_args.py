@@ -1,11 +1,10 @@
 """Converts arguments of teleop_twist_keyboard, in ROS 1 and ROS 2, to the flags of this teleop. Pure."""
 
-import argparse
 import re
 from collections.abc import Iterator
 
-from holozen import flags
 from holozen.suggest import shorten
+from holozen.wire import is_robot_name
 
 from .toml_file import InputError, cut, one_of
 
@@ -115,7 +114,7 @@ def _topic(remaps: list[tuple[str, str, str]]) -> list[str]:
     robot, _, last = goes[1:].rpartition("/")
     if goes == "/cmd_vel":
         return []
-    return [f"--robot={robot}"] if last == "cmd_vel" and _is_robot(robot) else [f"--cmd-vel={goes[1:]}"]
+    return [f"--robot={robot}"] if last == "cmd_vel" and is_robot_name(robot) else [f"--cmd-vel={goes[1:]}"]
 
 
 def _resolved(name: str, inside: str) -> str:
@@ -127,13 +126,6 @@ def _legal(name: str, word: str) -> str:
     if not _TOPIC.fullmatch(name):
         raise _wrong(word, f"{cut(name)} is not a ROS name; use letters, digits and '_', such as Fred/cmd_vel")
     return name
-
-
-def _is_robot(name: str) -> bool:
-    try:
-        return bool(flags.robot(name))
-    except argparse.ArgumentTypeError:
-        return False
 
 
 def _wrong(word: str, text: str) -> InputError:

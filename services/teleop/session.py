@@ -9,7 +9,7 @@ from holozen.odometry import LOST, RobotFeedback
 from holozen.transport.errors import ServiceError
 from holozen.transport.graph import Graph, on_key
 from holozen.transport.pubsub import Latest, Publisher
-from holozen.wire import PRIORITY_OF, key_for, robot_name
+from holozen.wire import PRIORITY_OF, is_robot_name, key_for
 
 from .control.layouts import FIXED
 from .control.twist_mapper import TwistMapper
@@ -171,7 +171,7 @@ class Session:
         places = {
             key.removesuffix("cmd_vel").rstrip("/") for key in keys if key == "cmd_vel" or key.endswith("/cmd_vel")
         }
-        places = {place for place in places if not place or _is_robot_name(place)}  # anyone may declare any token
+        places = {place for place in places if not place or is_robot_name(place)}  # anyone may declare any token
         return sorted({*places, self.client.robot, *([self._first] if self._command else [])})
 
     def listeners(self) -> list[str]:
@@ -229,10 +229,3 @@ class Session:
             self.warning = self.bus.call(key, TriggerRequest(), TriggerReply, RESUME_TIMEOUT).message
         except ServiceError as error:
             self.warning = f"not handed over: {error}"
-
-
-def _is_robot_name(text: str) -> bool:
-    try:
-        return bool(robot_name(text))
-    except ValueError:
-        return False

@@ -6,13 +6,10 @@ from collections.abc import Mapping
 
 from . import toml_file
 from .control.layouts import LAYOUTS
-from .ros_args import ros_arguments
+from .ros_args import PARAMETERS, ros_arguments
 from .toml_file import InputError, cut, one_of
 
-NAMES = (
-    "speed", "turn", "speed_limit", "turn_limit", "repeat_rate", "key_timeout", "stamped", "frame_id",
-    "mode", "keys", "plain", "deadman", "joystick",
-)  # fmt: skip
+NAMES = (*PARAMETERS, "mode", "keys", "plain", "deadman", "joystick")
 """The flags that the file may set. Robot and network are given on the command line only."""
 
 MODES = ("hold", "latch")  # the flag also accepts Zenoh's modes, which belong to the network

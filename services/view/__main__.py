@@ -61,6 +61,14 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: list[str] | None = None) -> int:
     args = parser().parse_args(argv)
+    try:
+        return _run(args)
+    except (BusError, BagError, OSError) as error:
+        report(f"view: {error}")
+        return 1
+
+
+def _run(args: argparse.Namespace) -> int:
     from .guard import is_loopback
 
     where = connection.from_arguments(args)
@@ -76,32 +84,28 @@ def main(argv: list[str] | None = None) -> int:
     if args.foxglove:
         return _serve_foxglove(args, where, token)
     stop = stop_event()
-    try:
-        _check_port(args.host, args.port)
-        from holozen.robot import description, loading, reader
+    _check_port(args.host, args.port)
+    from holozen.robot import description, loading, reader
 
-        from .guard import Guard
+    from .guard import Guard
 
-        reader.start(description, loading)
-        guard = Guard(token)
-        with _bus(args.bag, where, stop) as bus, contextlib.ExitStack() as ending:
-            playback = None
-            if args.bag:
-                from .playback import Playback
+    reader.start(description, loading)
+    guard = Guard(token)
+    with _bus(args.bag, where, stop) as bus, contextlib.ExitStack() as ending:
+        playback = None
+        if args.bag:
+            from .playback import Playback
 
-                playback = Playback(bus, args.bag)
-                ending.callback(playback.close)
-            server = _serve(args.host, args.port, guard)
-            try:
-                for line in _addresses(args, server.get_port(), token):
-                    report(f"view: {line}")
-                _show(bus, server, guard, args.look_only, playback, stop)
-            finally:
-                with contextlib.redirect_stdout(io.StringIO()):
-                    server.stop()
-    except (BusError, BagError, OSError) as error:
-        report(f"view: {error}")
-        return 1
+            playback = Playback(bus, args.bag)
+            ending.callback(playback.close)
+        server = _serve(args.host, args.port, guard)
+        try:
+            for line in _addresses(args, server.get_port(), token):
+                report(f"view: {line}")
+            _show(bus, server, guard, args.look_only, playback, stop)
+        finally:
+            with contextlib.redirect_stdout(io.StringIO()):
+                server.stop()
     return 0
 
 
@@ -116,23 +120,19 @@ def _serve_foxglove(args: argparse.Namespace, where: connection.Connection, toke
     if args.token is None:  # without a token, a page of any web site could connect
         token = secrets.token_urlsafe(16)
     stop = stop_event()
-    try:
-        _check_port(args.host, args.port)
-        from .foxglove_server import Relay, Server
-        from .guard import Guard
+    _check_port(args.host, args.port)
+    from .foxglove_server import Relay, Server
+    from .guard import Guard
 
-        with Bus("view", where, lasting=True, stop=stop) as bus, contextlib.ExitStack() as ending:
-            server = Server(bus, args.look_only)
-            ending.callback(server.close)
-            relay = Relay(Guard(token, apps=True), args.host, args.port, server.port, server.secret)
-            ending.callback(relay.close)
-            ending.callback(server.halt)  # first: clients may take their time
-            for line in _addresses(args, relay.port, token, "ws"):
-                report(f"view: {line}")
-            server.run(stop)
-    except (BusError, OSError) as error:
-        report(f"view: {error}")
-        return 1
+    with Bus("view", where, lasting=True, stop=stop) as bus, contextlib.ExitStack() as ending:
+        server = Server(bus, args.look_only)
+        ending.callback(server.close)
+        relay = Relay(Guard(token, apps=True), args.host, args.port, server.port, server.secret)
+        ending.callback(relay.close)
+        ending.callback(server.halt)  # first: clients may take their time
+        for line in _addresses(args, relay.port, token, "ws"):
+            report(f"view: {line}")
+        server.run(stop)
     return 0
 
 

@@ -127,8 +127,7 @@ class Topic:
 
     def __init__(self, bus: Bus, context: foxglove.Context, key: str, interface: Interface) -> None:
         self.key, self._bus, self._interface = key, bus, interface
-        schema = foxglove.Schema(name=interface.name, encoding="ros2msg", data=whole_text(interface).encode())
-        self.channel = foxglove.Channel(f"/{key}", message_encoding="cdr", schema=schema, context=context)
+        self.channel = foxglove.Channel(f"/{key}", message_encoding="cdr", schema=_schema(interface), context=context)
         self.clients = 0
         self._raw: RawSubscriber | None = None
         self._reported = False
@@ -406,22 +405,20 @@ class Server(ServerListener):
         """Call a service, and return its reply in CDR."""
         if request.client_id not in self._vouched:
             raise ValueError(LOOK_ONLY)
-        assert interface.request and interface.response
-        encoding = f"application/cdr;{interface.request.name}" if request.encoding == "cdr" else "application/json"
-        payload = codec.transcoded(interface.request, request.payload, encoding)
-        reply = call_bytes(self._bus, key, payload, f"application/cdr;{interface.request.name}", CALL)[0]
-        return codec.transcoded(interface.response, reply.payload, reply.encoding)
+        asks, answers = interface.parts
+        cdr = f"application/cdr;{asks.name}"
+        payload = codec.transcoded(asks, request.payload, cdr if request.encoding == "cdr" else "application/json")
+        reply = call_bytes(self._bus, key, payload, cdr, CALL)[0]
+        return codec.transcoded(answers, reply.payload, reply.encoding)
+
+
+def _schema(interface: Interface) -> foxglove.Schema:
+    return foxglove.Schema(name=interface.name, encoding="ros2msg", data=whole_text(interface).encode())
 
 
 def _service(key: str, interface: Interface, handler: Callable[[Any], bytes]) -> foxglove.Service:
-    def described(part: Interface | None) -> foxglove.MessageSchema:
-        assert part
-        schema = foxglove.Schema(name=part.name, encoding="ros2msg", data=whole_text(part).encode())
-        return foxglove.MessageSchema(encoding="cdr", schema=schema)
-
-    schema = foxglove.ServiceSchema(
-        interface.name, request=described(interface.request), response=described(interface.response)
-    )
+    request, response = (foxglove.MessageSchema(encoding="cdr", schema=_schema(part)) for part in interface.parts)
+    schema = foxglove.ServiceSchema(interface.name, request=request, response=response)
     return foxglove.Service(f"/{key}", schema=schema, handler=handler)
 
 

@@ -27,7 +27,7 @@ class Playback:
         self._outlet = Outlet(bus, plan([one.channel for one in summary.streams.values()], [], commands=True))
         self._pace, self._at = Pace(1.0), self._start  # ns
         self._target: int | None = self._start  # ns; the time to jump to
-        self._paused = True
+        self.paused = True  # whether it stands still
         self._changed, self._ending = threading.Condition(), False
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -37,17 +37,12 @@ class Playback:
         """The present time in the bag."""
         return (self._at - self._start) / 1e9
 
-    @property
-    def paused(self) -> bool:
-        """Whether it stands still."""
-        return self._paused
-
     def toggle(self) -> None:
         """Pause it, or go on; at the end, start again."""
         with self._changed:
-            if self._paused and self.position >= self.duration:
+            if self.paused and self.position >= self.duration:
                 self._target = self._start
-            self._paused = not self._paused
+            self.paused = not self.paused
             self._pace.jump(self._at, time.monotonic())
             self._changed.notify_all()
 
@@ -70,7 +65,7 @@ class Playback:
                 start, self._target = self._target, None
             if start is None or self._play(start):
                 with self._changed:
-                    self._paused = self._paused or start is not None  # it is at the end
+                    self.paused = self.paused or start is not None  # it is at the end
                     self._changed.wait_for(lambda: self._ending or self._target is not None)
 
     def _play(self, start: int) -> bool:
@@ -106,7 +101,7 @@ class Playback:
         with self._changed:
             while not self._ending and self._target is None:
                 left = self._pace.due(at) - time.monotonic()
-                if not self._paused and left <= 0:
+                if not self.paused and left <= 0:
                     return True
-                self._changed.wait(None if self._paused else left)
+                self._changed.wait(None if self.paused else left)
         return False

@@ -238,9 +238,7 @@ class Process:
     that is not read by anyone is dropped.
     """
 
-    def __init__(
-        self, action: Action, program: Program, name: str, drops_output: Callable[[], bool] = lambda: False
-    ) -> None:
+    def __init__(self, action: Action, program: Program, name: str, drops_output: Callable[[], bool]) -> None:
         self.action, self.program, self.name = action, program, name
         words = program.words[0] if program.shell else list(program.words)
         try:

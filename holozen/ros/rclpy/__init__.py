@@ -76,8 +76,9 @@ def shutdown(*, context: Context | None = None, uninstall_handlers: bool | None 
 def try_shutdown(*, context: Context | None = None, uninstall_handlers: bool | None = None) -> None:
     """Shut down, unless that has been done."""
     _end_global_state(context, uninstall_handlers)
-    is_default = context is None or context is get_default_context()
-    (get_default_context(shutting_down=True) if is_default else context or get_default_context()).try_shutdown()
+    if context is None or context is get_default_context():
+        context = get_default_context(shutting_down=True)
+    context.try_shutdown()
 
 
 def create_node(node_name: str, **options: Any) -> Node:

@@ -18,8 +18,7 @@ __all__ = [
 class NotInitializedException(Exception):
     """Something was used before `rclpy.init()`, or after `rclpy.shutdown()`."""
 
-    def __init__(self, *args: object) -> None:
-        super().__init__("call rclpy.init() first; rclpy is not running, or was shut down", *args)
+    __init__ = partialmethod(Exception.__init__, "call rclpy.init() first; rclpy is not running, or was shut down")
 
     def __str__(self) -> str:
         return "; ".join(map(str, self.args))
@@ -28,15 +27,13 @@ class NotInitializedException(Exception):
 class NoTypeSupportImportedException(Exception):
     """A type that is neither a message nor a service."""
 
-    def __init__(self, *args: object) -> None:
-        super().__init__("no type support imported", *args)
+    __init__ = partialmethod(Exception.__init__, "no type support imported")
 
 
 class NoImportTypeSupportException(Exception):
     """A type of an interface package that cannot be imported."""
 
-    def __init__(self, *args: object) -> None:
-        super().__init__("no type support to import", *args)
+    __init__ = partialmethod(Exception.__init__, "no type support to import")
 
 
 class ROSInterruptException(Exception):

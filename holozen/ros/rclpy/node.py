@@ -4,7 +4,7 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from enum import IntEnum
 from pathlib import Path
 from typing import Any, NamedTuple, Self, TypeVar
@@ -18,11 +18,7 @@ from holozen.ros.rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCa
 from holozen.ros.rclpy.client import Client
 from holozen.ros.rclpy.clock import USE_SIM_TIME, Clock, ROSClock, TimeSource
 from holozen.ros.rclpy.context import Context, get_default_context
-from holozen.ros.rclpy.exceptions import (
-    ParameterImmutableException,
-    ParameterNotDeclaredException,
-    ParameterUninitializedException,
-)
+from holozen.ros.rclpy.exceptions import ParameterUninitializedException
 from holozen.ros.rclpy.executors import Executor
 from holozen.ros.rclpy.handle import NamesAndTypes, NodeHandle, names_and_types
 from holozen.ros.rclpy.logging import RcutilsLogger
@@ -156,6 +152,11 @@ class _State(NodeHandle):
             one.detach()
 
 
+def _owned(kind: type, doc: str) -> property:
+    """An iterator over all that a node owns of a kind."""
+    return property(lambda node: iter(node._holozen.all(kind)), doc=doc)
+
+
 class Node(HelpfulAttributes):
     """A node of ROS, with its own session, and visible in the graph like any other.
 
@@ -249,35 +250,12 @@ class Node(HelpfulAttributes):
         if value is not None:
             value.add_node(self)
 
-    @property
-    def publishers(self) -> Iterator[Publisher]:
-        """Its publishers."""
-        return iter(self._holozen.all(Publisher))
-
-    @property
-    def subscriptions(self) -> Iterator[Subscription]:
-        """Its subscriptions."""
-        return iter(self._holozen.all(Subscription))
-
-    @property
-    def clients(self) -> Iterator[Client]:
-        """Its clients."""
-        return iter(self._holozen.all(Client))
-
-    @property
-    def services(self) -> Iterator[Service]:
-        """Its services."""
-        return iter(self._holozen.all(Service))
-
-    @property
-    def timers(self) -> Iterator[Timer]:
-        """Its timers."""
-        return iter(self._holozen.all(Timer))
-
-    @property
-    def guards(self) -> Iterator[GuardCondition]:
-        """Its guard conditions."""
-        return iter(self._holozen.all(GuardCondition))
+    publishers = _owned(Publisher, "Its publishers.")
+    subscriptions = _owned(Subscription, "Its subscriptions.")
+    clients = _owned(Client, "Its clients.")
+    services = _owned(Service, "Its services.")
+    timers = _owned(Timer, "Its timers.")
+    guards = _owned(GuardCondition, "Its guard conditions.")
 
     def destroy_node(self) -> None:
         """Destroy the node and all it owns. The other nodes see it leave shortly, at the latest at shutdown."""
@@ -443,10 +421,7 @@ class Node(HelpfulAttributes):
     def undeclare_parameter(self, name: str) -> None:
         """Remove a parameter. Raises ParameterNotDeclaredException, ParameterImmutableException."""
         with self._holozen.store.lock:
-            if not self.has_parameter(name):
-                raise ParameterNotDeclaredException(name)
-            if self._holozen.store.descriptors[name].read_only:
-                raise ParameterImmutableException(name)
+            self._holozen.store.check_changeable(name)
             self._holozen.store.forget(name)
 
     def has_parameter(self, name: str) -> bool:
@@ -520,10 +495,7 @@ class Node(HelpfulAttributes):
         ParameterImmutableException.
         """
         with self._holozen.store.lock:
-            if not self.has_parameter(name):
-                raise ParameterNotDeclaredException(name)
-            if self._holozen.store.descriptors[name].read_only:
-                raise ParameterImmutableException(name)
+            self._holozen.store.check_changeable(name)
             new = self.get_parameter(name)
             if alternative_value is not None:
                 message = find("rcl_interfaces/msg/Parameter")(name=name, value=alternative_value)

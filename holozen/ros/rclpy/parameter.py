@@ -15,6 +15,7 @@ from holozen.ros.rclpy.exceptions import (
     InvalidParameterTypeException,
     InvalidParameterValueException,
     ParameterAlreadyDeclaredException,
+    ParameterImmutableException,
     ParameterNotDeclaredException,
 )
 from holozen.ros.rclpy.names import join, key, text_of
@@ -66,7 +67,7 @@ class Parameter:
                     if all(_is_a(each, kind) for each in parameter_value):
                         return cls[name]
             raise TypeError(
-                f"{_short(parameter_value)} cannot be the value of a parameter: use a bool, int, float or str, "
+                f"{shorten(repr(parameter_value))} cannot be the value of a parameter: use a bool, int, float or str, "
                 "or a list of one of them"
             )
 
@@ -88,7 +89,7 @@ class Parameter:
             raise TypeError(f"parameter {name!r}: type_ must be a Parameter.Type, not {article(type(type_).__name__)}")
         if not type_.check(value):
             got = Parameter.Type.from_parameter_value(value)
-            raise ValueError(f"parameter {name!r}: {_short(value)} is {got.name}, but its type is {type_.name}")
+            raise ValueError(f"parameter {name!r}: {shorten(repr(value))} is {got.name}, but its type is {type_.name}")
         self._name, self._type_, self._value = name, type_, value
 
     @classmethod
@@ -136,9 +137,7 @@ class Parameter:
 
 
 SCALARS: dict[type, str] = {bool: "BOOL", int: "INTEGER", float: "DOUBLE", str: "STRING"}
-LISTS: dict[type, str] = {
-    bytes: "BYTE_ARRAY", bool: "BOOL_ARRAY", int: "INTEGER_ARRAY", float: "DOUBLE_ARRAY", str: "STRING_ARRAY",
-}  # fmt: skip
+LISTS: dict[type, str] = {bytes: "BYTE_ARRAY"} | {kind: f"{name}_ARRAY" for kind, name in SCALARS.items()}
 
 
 def get_parameter_value(string_value: str) -> Any:
@@ -198,10 +197,6 @@ def _plain(value: Any) -> Any:
 
 def _is_a(value: object, kind: type) -> bool:
     return isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
-
-
-def _short(value: object) -> str:
-    return shorten(repr(value))
 
 
 TOLERANCE = 1e-9  # of the steps of a range: decimal fractions are not exact in binary
@@ -289,6 +284,13 @@ class ParameterStore:
         missing = [name for name in names if name not in self.values]
         if missing and not self.allow_undeclared:
             raise ParameterNotDeclaredException(missing)
+
+    def check_changeable(self, name: str) -> None:
+        """Raises ParameterNotDeclaredException, ParameterImmutableException."""
+        if name not in self.values:
+            raise ParameterNotDeclaredException(name)
+        if self.descriptors[name].read_only:
+            raise ParameterImmutableException(name)
 
     def set(self, parameters: list[Parameter]) -> str:
         """Set all or none; the reason of a rejection, empty if all were set. Raises ParameterNotDeclaredException."""

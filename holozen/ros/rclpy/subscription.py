@@ -47,8 +47,8 @@ class Subscription(Owned, Waitable):
         self.callback_group = callback_group
         self.callback = callback
         self.bad = 0
-        self._handle, self._kinds = handle, (msg_type,)
-        self._tolerant = not wire.is_command(key(topic), (kind.ROS for kind in self._kinds))
+        self._handle = handle
+        self._tolerant = not wire.is_command(key(topic), (msg_type.ROS,))
         depth = queue_length(qos_profile)
         self._reader = handle.bus.subscribe(key(topic), msg_type, depth=depth)
         raw_subscriber = self._reader.raw
@@ -103,7 +103,7 @@ class Subscription(Owned, Waitable):
             try:
                 message = sample.payload
                 if not self.raw:
-                    message = codec.decode(sample.payload, sample.encoding, self._kinds, self._tolerant)
+                    message = codec.decode(sample.payload, sample.encoding, (self.msg_type,), self._tolerant)
             except codec.CodecError as error:
                 self.bad += 1
                 source = sample.source or "an unknown sender"

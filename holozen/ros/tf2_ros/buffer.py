@@ -89,7 +89,7 @@ class Buffer(HelpfulAttributes):
         """
         when = nanoseconds(time)
         stamp, found = self._within(timeout, lambda: self._core.lookup(target_frame, source_frame, when))
-        return _message(target_frame, source_frame, stamp, found)
+        return message_of(target_frame, source_frame, stamp, found)
 
     def lookup_transform_full(
         self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str,
@@ -98,7 +98,7 @@ class Buffer(HelpfulAttributes):
         """As lookup_transform, between two frames at two times, assuming that `fixed_frame` did not move."""
         to, since = nanoseconds(target_time), nanoseconds(source_time)
         look = lambda: self._core.lookup_full(target_frame, to, source_frame, since, fixed_frame)  # noqa: E731
-        return _message(target_frame, source_frame, to, self._within(timeout, look))
+        return message_of(target_frame, source_frame, to, self._within(timeout, look))
 
     def can_transform(
         self, target_frame: str, source_frame: str, time: Any, timeout: Any = None, return_debug_tuple: bool = False
@@ -215,7 +215,8 @@ def nanoseconds(time: Any) -> int:
     raise TypeError(f"{time!r} is not a time; use rclpy.time.Time(), or a Duration(seconds=...) as timeout")
 
 
-def _message(target: str, source: str, stamp: int, transform: Transform) -> Any:
+def message_of(target: str, source: str, stamp: int, transform: Transform) -> Any:
+    """The TransformStamped from `source` to `target` at `stamp` (ns)."""
     message: Any = find("geometry_msgs/msg/TransformStamped")()
     message.header.stamp = Time(nanoseconds=stamp).to_msg()
     message.header.frame_id, message.child_frame_id = target, source

@@ -11,11 +11,11 @@ from typing import Any
 
 from holozen.flags import Parser, number
 from holozen.ros import rclpy
-from holozen.ros.generated import find
 from holozen.ros.rclpy.context import ExternalShutdownException
 from holozen.ros.rclpy.node import Node
+from holozen.ros.tf2_ros.buffer import message_of
 from holozen.ros.tf2_ros.transform_broadcaster import StaticTransformBroadcaster
-from holozen.rotation import from_rpy, normalize
+from holozen.rotation import Transform, from_rpy, normalize
 
 PARTS = ("x", "y", "z", "qx", "qy", "qz", "qw", "roll", "pitch", "yaw")
 ANGLES, QUATERNION = ("x", "y", "z", "yaw", "pitch", "roll"), PARTS[:7]
@@ -48,12 +48,7 @@ def read(words: Sequence[str]) -> argparse.Namespace:
 
 def transform(args: argparse.Namespace) -> Any:
     """The TransformStamped of the arguments."""
-    message: Any = find("geometry_msgs/msg/TransformStamped")()
-    message.header.frame_id, message.child_frame_id = args.frame_id, args.child_frame_id
-    t, q = message.transform.translation, message.transform.rotation
-    t.x, t.y, t.z = args.x, args.y, args.z
-    q.x, q.y, q.z, q.w = args.rotation
-    return message
+    return message_of(args.frame_id, args.child_frame_id, 0, Transform((args.x, args.y, args.z), args.rotation))
 
 
 def main() -> None:
