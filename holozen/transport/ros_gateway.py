@@ -56,7 +56,6 @@ UNKNOWN_AGE = (
     f"a first command has a time of sending more than {wire.COMMAND_SILENCE:g} s from this machine's clock; it is late,"
     f" or the clocks differ: set them, or go on publishing, and after {rmw.PACE:g} s commands are forwarded"
 )
-FREEING = ("release", "resume")  # the services after which a robot may move; no late call ends a stop from after it
 LATE = (
     f"it was sent more than {wire.COMMAND_SILENCE:g} s from this machine's clock: it is late, and has to be sent again,"
     " or the clocks differ: set them, or use `holozen release` or `holozen controller --resume`"
@@ -436,7 +435,7 @@ class Gateway:
         request = f"application/cdr;{interface.request.name}"
         try:
             is_late = stamp and abs(time.time() - stamp.sent / 1e9) > wire.COMMAND_SILENCE
-            if is_late and found.topic.rpartition("/")[2] in FREEING:
+            if is_late and found.topic.rpartition("/")[2] in wire.FREEING:
                 raise ServiceError(LATE)
             reply = self._replied(found.topic, bytes(query.payload or b""), request)
             payload = codec.transcoded(interface.response, reply.payload, reply.encoding)

@@ -32,14 +32,13 @@ from holozen.messages.registry import Registry
 from holozen.transport.graph import Endpoint
 from holozen.transport.samples import RawSubscriber
 from holozen.transport.services import call_bytes
-from holozen.wire import PRIORITY_OF, is_command, stop
+from holozen.wire import FREEING, PRIORITY_OF, is_command, stop
 
 from .guard import Guard, TimedConnection
 
 PROTOCOL = Subprotocol("foxglove.sdk.v1")
 OLDER = Subprotocol("foxglove.websocket.v1")  # the same by another name, which older clients ask for
 MESSAGE, CALL_OF = b"\x01", b"\x02"  # the first bytes of frames in which a client publishes, and calls a service
-FREEING = ("release", "resume")  # the services after which a robot may move; no late call ends a stop from after it
 LOOK_EVERY, DRAIN_EVERY = 0.5, 0.01  # s; how often the graph is read, and the topics are
 DEPTH = 64  # messages of a topic that wait
 CALL = 5.0  # s for a service
