@@ -176,12 +176,13 @@ class _Listener:
                 if in_a_row == DEPTH:
                     self.overran, in_a_row = self.overran + 1, 0
                 sample = waiting or self._wait()
-                if not self._intake.wanted(sample.key):
+                key = sample.key
+                if not self._intake.wanted(key):
                     continue
                 if sample.is_deletion:  # replayed, it would be an empty message
                     self._intake.deletions += 1
                 else:
-                    self._intake.add(sample.key, sample.payload, sample.encoding, sample.number)
+                    self._intake.add(key, sample.payload, sample.encoding, sample.number)
         except Exception:  # raised by a closed subscriber; anything else is an error
             if not self._closing:
                 raise

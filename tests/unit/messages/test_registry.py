@@ -149,6 +149,12 @@ def test_a_wrong_line_of_a_nested_type_is_reported_with_its_place(lesson: Path) 
     assert message.endswith("/msg/Spot.msg:1: no type 'lesson/msg/float'; write float32 or float64")
 
 
+def refusal_of_file(lesson: Path, file: str, text: str) -> str:
+    """Why a file of the package is refused that holds this text."""
+    (lesson / file).write_text(text)
+    return refusal(Registry({"lesson": lesson}), f"lesson/{file.partition('.')[0]}")
+
+
 def test_names_that_ros_refuses_are_reported_with_those_to_write(lesson: Path) -> None:
     for file, text, reason in [
         ("msg/Spot.msg", "float64 xGoal", "'xGoal' is not a valid name of a field; ROS 2 allows lower-case letters"),
@@ -160,8 +166,7 @@ def test_names_that_ros_refuses_are_reported_with_those_to_write(lesson: Path) -
         ("srv/next_goal.srv", "---", "'next_goal' is not a valid name of a type; ROS 2 allows letters and digits"),
         ("srv/next_goal.srv", "---", "upper-case letter: NextGoal"),
     ]:
-        (lesson / file).write_text(text)
-        message = refusal(Registry({"lesson": lesson}), f"lesson/{file.partition('.')[0]}")
+        message = refusal_of_file(lesson, file, text)
         assert message.startswith(f"{lesson}/{file}") and reason in message
 
 
@@ -179,8 +184,7 @@ def test_what_is_no_definition_is_reported_with_its_file(lesson: Path) -> None:
         ("msg/Spot.msg", "uint8[1000000000] a", "is too large: at least 1000000000 bytes"),
         ("srv/Spot.srv", "bool a", "'---' makes 1 part; a .srv has 2"),
     ]:
-        (lesson / file).write_text(text)
-        assert reason in refusal(Registry({"lesson": lesson}), f"lesson/{file.partition('.')[0]}")
+        assert reason in refusal_of_file(lesson, file, text)
 
 
 def test_types_that_double_at_each_level_are_refused(lesson: Path) -> None:
