@@ -256,10 +256,12 @@ class ActionServer(Goals):
         threading.Thread(target=self._wait_for_results, daemon=True).start()
 
     def answer(self) -> bool:
-        """Answer waiting requests, for a short time. Returns whether more may wait."""
+        """Answer waiting requests, for a short time. Returns whether it read any."""
+        read = False
         while (query := self._results.try_recv()) is not None:
             self._result(query)
-        return answer_in_turn(self._servers)
+            read = True
+        return answer_in_turn(self._servers) or read
 
     def finish(self, goal: Goal, state: State, result: Any) -> None:
         """End a goal, and answer the requests that wait for its result."""

@@ -105,7 +105,7 @@ class Parameters:
         ]
 
     def answer(self) -> bool:
-        """Answer waiting requests, for a short time. Returns whether more may wait."""
+        """Answer waiting requests, for a short time. Returns whether it answered any."""
         return answer_in_turn(self._servers)
 
     def start(self) -> None:

@@ -307,17 +307,16 @@ def _waited(answers: bytes, tag: str) -> float | None:
 
 def answer_in_turn(servers: list[Server], seconds: float = BUDGET) -> bool:
     """Answer waiting requests of several services: one request of each in turn, for `seconds`, but at least one.
-    Returns whether more may wait.
+    Returns whether it answered any; then more may wait.
     """
     for server in servers:
         server.take_in()
-    deadline, idle = time.monotonic() + seconds, 0
-    while idle < len(servers):
+    deadline, idle, answered = time.monotonic() + seconds, 0, False
+    while idle < len(servers) and not (answered and time.monotonic() >= deadline):
         idle = 0 if servers[0].answer_pending(most=1) else idle + 1
+        answered |= not idle
         servers.append(servers.pop(0))
-        if not idle and time.monotonic() >= deadline:
-            return True
-    return False
+    return answered
 
 
 def refuse(query: Any, text: str, fields: Mapping[str, object] = {}) -> None:

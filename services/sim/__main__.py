@@ -158,7 +158,7 @@ class Rivals:
         self.first = ""
 
     def answer(self) -> bool:
-        """Look, if the graph has changed and another node publishes a clock. Returns False: no request waits."""
+        """Look, if the graph has changed and another node publishes a clock. Returns False: it answers nothing."""
         if not self.first and self._entities.has_new_clock():
             others = self._entities.others_on("spawn_entity", "srv")
             if first := next((one for one in others if one.session < self._session), None):

@@ -20,17 +20,17 @@ from .simulation import Simulation
 CLOCK_RATE = 50.0  # Hz of sim time
 STATUS_RATE = 10.0  # Hz of real time
 PAUSED_RATE = 20.0  # Hz of real time, at which a paused world is published, so that no reader takes it for lost
-PAUSED_POLL = 0.002  # s; how often requests are read while paused
 MEASURED = 1.0  # s of real time over which the real-time factor is measured
 REPORT_EVERY = 60.0  # s between two reports of overruns
-POLL = 0.02  # s; how often requests are read, and commands while no step is due
+POLL = 0.02  # s; the longest time between two readings of requests, and of commands while no step is due
+SHARE = 0.1  # of the time since the last request, after which requests are read again: one often follows another
 READ_EVERY = 0.003  # s between two readings of commands and stops, and of nodes that left, however short the steps
 FAULTS = (ArithmeticError, ValueError)  # of a body whose position became NaN
 
 
 class Loop:
     """Runs one world with its entities at `rtf` times real time (0: as fast as possible). With `is_clock` it publishes
-    its time. The `answers` are called between steps, and return whether more requests wait.
+    its time. The `answers` are called between steps, and return whether they answered a request.
     """
 
     def __init__(self, bus: Bus, world: World, entities: Entities, rtf: float, is_clock: bool = True) -> None:
@@ -38,7 +38,7 @@ class Loop:
         self.pace = Pace(world.spec.step, rtf, time.monotonic())
         self.answers: list[Callable[[], bool]] = []
         self._served = self._polled = 0.0
-        self._more_wait = False  # whether requests were left unanswered
+        self._answered_at = -math.inf  # s; the last time that a request was answered
         self._clock = bus.publisher("clock", Clock) if is_clock else None
         self._clock_due = Schedule(CLOCK_RATE)
         self._status = bus.publisher("simulation_status", SimulationStatus) if is_clock else None
@@ -63,7 +63,7 @@ class Loop:
             if self.simulation.is_paused:
                 self._step_on_request(now, stop)
             elif (left := pace.left(now)) > 0:
-                stop.wait(min(left, 0.0 if self._more_wait else POLL))
+                stop.wait(min(left, self._until_served(now)))
             else:
                 self._step(now)
                 pace.stepped(now)
@@ -78,7 +78,11 @@ class Loop:
             self.publish_all()
             self._shown_at = now + 1 / PAUSED_RATE
         else:
-            stop.wait(PAUSED_POLL)
+            stop.wait(self._until_served(now))
+
+    def _until_served(self, now: float) -> float:
+        """The time in s until requests are read again. It is 0 right after one was answered, as more may wait."""
+        return min(SHARE * (now - self._answered_at), POLL)
 
     def publish_all(self) -> None:
         """Publish the present state of everything."""
@@ -124,10 +128,10 @@ class Loop:
             self._reported, self._reported_at = pace.overruns, now
 
     def _read_inputs(self, now: float) -> None:
+        if now < self._reads_at:
+            return
         steps = self.simulation.steps
         is_asked = steps is not None and not steps.may_begin
-        if now < self._reads_at and not is_asked and not self._more_wait:
-            return
         since = self._reads.since(now)
         moment = Moment(now, since, (time.time(), self._world.time))
         self._entities.commands.read(moment)
@@ -141,10 +145,11 @@ class Loop:
             self._polled = now
         if steps:
             steps.may_begin = True  # all commands sent before the request have been read
-        if now - self._served >= (PAUSED_POLL if self.simulation.is_paused else POLL):
-            self._more_wait = sum(answer() for answer in self.answers) > 0  # calls them all, unlike any()
-            self._served = -math.inf if self._more_wait else now
-        self._reads_at = now + READ_EVERY
+        if now - self._served >= self._until_served(now):
+            if sum(answer() for answer in self.answers):  # calls them all, unlike any()
+                self._answered_at = now
+            self._served = now
+        self._reads_at = now + min(READ_EVERY, self._until_served(now))
 
     def _step(self, now: float) -> None:
         world, dt, agenda = self._world, self._world.spec.step, self._entities.agenda

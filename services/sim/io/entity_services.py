@@ -81,8 +81,8 @@ class EntityServices:
             )
 
     def answer(self) -> bool:
-        """Answer waiting requests for a short time, since many at once must not stall the steps. Returns whether more
-        may be waiting.
+        """Answer waiting requests for a short time, since many at once must not stall the steps. Returns whether it
+        answered any.
         """
         return answer_in_turn(self._servers)
 

@@ -44,14 +44,16 @@ class SimulationServices:
         self._paused_at = -math.inf  # s; the last request to pause or stop
 
     def answer(self) -> bool:
-        """Answer waiting requests for a short time. Returns whether more may be waiting."""
+        """Answer waiting requests for a short time. Returns whether it answered or began any."""
+        begun = False
         while not self._simulation.steps and (query := self._steps.try_recv()) is not None:
             self._step(query)
+            begun = True
         if self._goal and self._goal.state is GoalState.CANCELING:
             self._simulation.end_steps("the goal was cancelled")
         if self._goal and time.monotonic() >= self._reported + FEEDBACK_EVERY:
             self._report_progress(self._goal)
-        return self._action.answer() | answer_in_turn(self._servers)
+        return begun | self._action.answer() | answer_in_turn(self._servers)
 
     def state(self, _request: si.GetSimulationStateRequest) -> si.GetSimulationStateReply:
         """The state of the sim."""

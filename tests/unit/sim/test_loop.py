@@ -384,6 +384,23 @@ def test_a_changed_timeout_applies_to_the_current_driver(clock: list[float], sim
     assert sim.robot.mover.body.twist()[0] == (0, 0, 0)
 
 
+def test_a_paused_sim_reads_the_request_after_another_at_once_and_rests_when_none_comes(sim: Sim) -> None:
+    waits: list[float] = []
+
+    class Stop(threading.Event):
+        def wait(self, timeout: float | None = None) -> bool:
+            waits.append(timeout or 0.0)
+            if timeout == POLL or len(waits) == 10_000:
+                self.set()
+            return super().wait(timeout)
+
+    asked = iter([True])
+    sim.loop.answers.append(lambda: next(asked, False))
+    sim.loop.simulation.pause(time.monotonic())
+    sim.loop.run(Stop())
+    assert waits[0] == 0.0 and waits[-1] == POLL and waits == sorted(waits)
+
+
 def test_a_stall_is_an_overrun_in_the_status(
     clock: list[float], wire: Wire, world: World, capsys: pytest.CaptureFixture[str]
 ) -> None:
