@@ -215,12 +215,15 @@ class Parts:
 
 @dataclass(slots=True)
 class Driver:
-    """The source that drives, its motion, and the earliest time (s) at which that was sent. Rank 0 is the highest."""
+    """The source that drives, its motion, and the earliest time (s) at which that was sent. Rank 0 is the highest. Of
+    one that is `gone`, no command is obeyed.
+    """
 
     source: str
     rank: int
     motion: Motion
     sent: float
+    gone: bool = False
 
 
 class Held:
@@ -408,7 +411,7 @@ class Arbiter:
         name of a source begins with that of a member, as in the secure set-up, and that is ignored.
         """
         if self._driver and source == (self._driver.source.partition("/")[2] if of_members else self._driver.source):
-            self._drive(replace(self._driver, motion=STOP))
+            self._drive(replace(self._driver, motion=STOP, gone=True))
 
     def holds(self, source: str, rank: int, now: float) -> bool:
         """Whether a source has to wait for `resume`, or has to let go, before it may drive."""

@@ -183,6 +183,7 @@ class TwistInput(Input[Twist | TwistStamped]):
         """The source that drives, the sources of recent commands, and the counts so far."""
         self.has_news = False
         driver, held = self.arbiter.driver(now), self.arbiter.holds
+        driver = None if driver and driver.gone else driver
         obeyed = driver.source if driver else ""
         motion = driver.motion if driver and isinstance(driver.motion, tuple) else STOP  # that of joints is no velocity
         return CommandStatus(

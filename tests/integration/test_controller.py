@@ -184,10 +184,12 @@ def test_a_robot_that_is_not_there_is_reported_with_those_that_are(town: Wire, s
     assert controller.terminate() == 0
 
 
-def test_killed_it_leaves_a_robot_that_stands(scene: Scene) -> None:
+def test_killed_it_leaves_a_robot_that_stands_and_one_started_at_once_drives_it(scene: Scene, wire: Wire) -> None:
     scene.controller.kill()
     last = scene.robot.newest()
+    scene.controller = wire.start("controller", "--laps", "0")
     assert distance(last, scene.robot.stands()) < 0.5 * 0.65
+    scene.controller_drives()
 
 
 def test_it_has_patience_with_a_pose_service_that_comes_last_and_goes(wire: Wire) -> None:
