@@ -23,7 +23,7 @@ PAUSED_RATE = 20.0  # Hz of real time, at which a paused world is published, so 
 MEASURED = 1.0  # s of real time over which the real-time factor is measured
 REPORT_EVERY = 60.0  # s between two reports of overruns
 POLL = 0.02  # s; the longest time between two readings of requests, and of commands while no step is due
-SHARE = 0.1  # of the time since the last request, after which requests are read again: one often follows another
+SHARE = 0.25  # of the time since the last request, after which requests are read again: one often follows another
 READ_EVERY = 0.003  # s between two readings of commands and stops, and of nodes that left, however short the steps
 FAULTS = (ArithmeticError, ValueError)  # of a body whose position became NaN
 
