@@ -225,6 +225,7 @@ def _show(
         drivers.close(client.client_id)
         if page := pages.pop(client.client_id, None):
             page.close()
+        drivers.keep([page.driver for page in pages.values()])
 
     async def draw(now: float, news: News) -> None:
         scene.draw(now, news, {page.robot: driver for page in pages.values() if (driver := page.driver)})
@@ -237,7 +238,10 @@ def _show(
     try:
         while not stop.is_set():
             now = time.monotonic()
-            asyncio.run_coroutine_threadsafe(draw(now, scene.ask()), server.get_event_loop()).result()
+            if pages:  # else the sims have nothing to do for it
+                asyncio.run_coroutine_threadsafe(draw(now, scene.ask()), server.get_event_loop()).result()
+            else:
+                scene.rest()
             stop.wait(max(0.0, scene.frame - (time.monotonic() - now)))
     finally:
         drivers.halt()

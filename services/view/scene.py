@@ -190,6 +190,10 @@ class Scene:
             self._goals.update()
             self._follow(watched)
 
+    def rest(self) -> None:
+        """No page is open: the next frame is the first one whose time counts."""
+        self._times.clear()
+
     def close(self) -> None:
         """Stop requesting goals."""
         self._goals.close()

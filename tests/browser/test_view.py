@@ -17,6 +17,8 @@ from holozen import data, entities
 from holozen.bus import Bus
 from holozen.cli.spawn import Place, spawn_file
 from holozen.messages import (
+    GetSceneReply,
+    GetSceneRequest,
     Header,
     Image,
     LaserScan,
@@ -675,6 +677,24 @@ def shows_arrow_at(page: Page, x: float) -> bool:
     """Whether the orange arrow of a robot without a description is there."""
     middle = deck(page)
     return middle is not None and math.dist(middle, pixel(x, 0.0, 0.03)) < NEAR
+
+
+def test_the_sims_are_asked_for_the_scene_while_a_page_is_open(wire: Wire, opened: Open) -> None:
+    requests: list[GetSceneRequest] = []
+
+    def answer(request: GetSceneRequest) -> GetSceneReply:
+        requests.append(request)
+        return GetSceneReply()
+
+    def rests() -> bool:
+        before = len(requests)
+        return not is_soon(lambda: len(requests) > before)
+
+    wire.bus("sim").serve("get_scene", GetSceneRequest, GetSceneReply, answer).start()
+    page = opened(address(wire.start("view", "--port", "0")), ready="no robot is there")
+    wait_for(lambda: requests, what="a request")
+    page.close()
+    wait_for(rests, what="the last request")
 
 
 def test_a_page_needs_the_token(chromium: Browser, page: Page, view: str) -> None:
