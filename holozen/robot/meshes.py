@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
-from typing import BinaryIO, TypeVar
+from typing import BinaryIO
 
 import numpy as np
 import numpy.typing as npt
@@ -315,18 +315,9 @@ class _Scene:
             node, above = waiting.pop()
             frame = above @ _transform(node)
             yield from ((self.named("geometry", tag), frame, tag) for tag in node.all("instance_geometry"))
-            yield from (self._skin(tag, frame) for tag in node.all("instance_controller"))
             waiting += [(tag, frame) for tag in node.all("node")]
             waiting += [(self.named("node", tag), frame) for tag in node.all("instance_node")]
         raise root.wrong(f"has more than {MAX_NODES} nodes in its scene, or one that contains itself")
-
-    def _skin(self, tag: Tag, frame: Array) -> tuple[Tag, Array, Tag]:
-        controller = self.named("controller", tag)
-        skin = controller.first("skin")
-        if skin is None:
-            raise controller.wrong("has no <skin>; other controllers are not supported")
-        bind = skin.first("bind_shape_matrix")
-        return self.named("geometry", skin, "source"), frame if bind is None else frame @ _matrix(bind), tag
 
     def color(self, instance: Tag, symbol: str) -> Color | None:
         """The diffuse colour of a geometry's material where it is placed; None if it has none or is a texture."""
@@ -389,14 +380,6 @@ def _fan(faces: Tag, corners: Array) -> Array:
     return np.stack([np.full(len(corners) - 2, corners[0]), corners[1:-1], corners[2:]], axis=1)
 
 
-def _strip(faces: Tag, corners: Array) -> Array:
-    if len(corners) < 3:
-        return _triples(faces, corners)
-    found = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
-    found[1::2] = found[1::2, ::-1]  # every second one is turned round
-    return found
-
-
 def _polygons(faces: Tag, corners: Array) -> Array:
     """The triangles of polygons, of which `<vcount>` gives the number of corners."""
     tag = faces.first("vcount")
@@ -412,7 +395,7 @@ def _polygons(faces: Tag, corners: Array) -> Array:
 
 
 _TRIANGLES: dict[str, Callable[[Tag, Array], Array]] = {
-    "triangles": _triples, "polylist": _polygons, "polygons": _fan, "tristrips": _strip, "trifans": _fan,
+    "triangles": _triples, "polylist": _polygons, "polygons": _fan, "trifans": _fan,
 }  # fmt: skip
 """Element -> the function that turns the corners in one of its <p> into triangles (m, 3)."""
 
@@ -474,10 +457,9 @@ def _numbers(tag: Tag, text: str) -> npt.NDArray[np.float64]:
         raise tag.wrong("contains something that is not a number") from None
 
 
-# Mesh files. Each is read once per process.
+# Mesh files. Each is read once by a process, which lives no longer than the reading of a robot, see reader.py.
 
 
-T = TypeVar("T")
 UNSCALED = (1.0, 1.0, 1.0)
 MAX_DATA = 1_000_000  # characters of a data: URI; the hull of any mesh takes 6000
 POINTER = b"version https://git-lfs.github.com/spec/v1"  # the start of a placeholder for a file that was not fetched
@@ -502,7 +484,7 @@ def hull(path: Path, scale: Vector = UNSCALED) -> tuple[Vector, ...]:
 
     `scale` is the URDF's, applied to the file's coordinates in metres. Raises RobotError naming the file.
     """
-    return _checked(_scaled(*_identity(path), scale))
+    return _solid(_extremes(path), scale, str(path))
 
 
 def bounds(path: Path, scale: Vector = UNSCALED) -> tuple[Vector, Vector]:
@@ -513,8 +495,7 @@ def bounds(path: Path, scale: Vector = UNSCALED) -> tuple[Vector, Vector]:
 
 def data_uri(path: Path) -> str:
     """The unscaled hull of a mesh as a `data:` URI, to replace the file's name. Raises RobotError."""
-    found = _checked(_extremes(*_identity(path)))
-    return "data:model/stl;base64," + base64.b64encode(write_stl(found)).decode()
+    return "data:model/stl;base64," + base64.b64encode(write_stl(_extremes(path))).decode()
 
 
 def data_hull(uri: str, scale: Vector = UNSCALED) -> tuple[Vector, ...]:
@@ -531,9 +512,20 @@ def data_hull(uri: str, scale: Vector = UNSCALED) -> tuple[Vector, ...]:
     return _solid(_farthest(read_stl(io.BytesIO(data), len(data), "data: URI"), "data: URI"), scale, "data: URI")
 
 
+@lru_cache
 def file_uri(path: Path) -> str:
     """A whole mesh file, compressed, as a `data:` URI to replace its name, for viewers. Raises RobotError."""
-    return _packed(*_identity(path))
+    size, kind = (
+        _size(path),
+        KINDS.get(os.path.splitext(os.path.realpath(path))[1].lower()),
+    )  # a link may lead elsewhere
+    if kind is None or not 0 < size <= MAX_SHOWN:
+        raise RobotError(f"{path}: a mesh to show is a {', '.join(KINDS)} file of up to {MAX_SHOWN / 1e6:.0f} MB")
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise RobotError(f"{path}: {error.strerror}") from None
+    return f"data:model/{kind}+gzip;base64,{base64.b64encode(gzip.compress(content, mtime=0)).decode()}"
 
 
 def file_in(uri: str) -> tuple[str, bytes]:
@@ -559,56 +551,20 @@ def surfaces_in(uri: str) -> Iterator[Surface]:
         yield part
 
 
-@lru_cache(maxsize=64)
-def _packed(path: str, _mtime: int, size: int) -> str:
-    kind = KINDS.get(os.path.splitext(os.path.realpath(path))[1].lower())  # a link may lead to private data
-    if kind is None or not 0 < size <= MAX_SHOWN:
-        raise RobotError(f"{path}: a mesh to show is a {', '.join(KINDS)} file of up to {MAX_SHOWN / 1e6:.0f} MB")
-    try:
-        content = Path(path).read_bytes()
-    except OSError as error:
-        raise RobotError(f"{path}: {error.strerror}") from None
-    return f"data:model/{kind}+gzip;base64,{base64.b64encode(gzip.compress(content, mtime=0)).decode()}"
-
-
-def _identity(path: Path) -> tuple[str, int, int]:
-    """Path, time and size, which identify a version of a file. Only regular files are opened: a FIFO would block."""
+def _size(path: Path) -> int:
+    """The size of a file in bytes. Raises RobotError for anything but a regular one: a FIFO would block."""
     try:
         state = os.stat(path)
     except (OSError, ValueError) as error:
         raise RobotError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     if not stat.S_ISREG(state.st_mode):
         raise RobotError(f"{path}: is not a file that could contain a mesh")
-    return str(path), state.st_mtime_ns, state.st_size
+    return state.st_size
 
 
-def _checked(found: T | str) -> T:
-    if isinstance(found, str):
-        raise RobotError(found)
-    return found
-
-
-# Errors are cached too, as text, so that an invalid file is read only once.
-
-
-@lru_cache(maxsize=1024)
-def _scaled(path: str, mtime: int, size: int, scale: Vector) -> tuple[Vector, ...] | str:
-    try:
-        return _solid(_checked(_extremes(path, mtime, size)), scale, path)
-    except RobotError as error:
-        return str(error)
-
-
-@lru_cache(maxsize=1024)
-def _extremes(path: str, _mtime: int, size: int) -> Array | str:
-    try:
-        return _read(path, size)
-    except RobotError as error:
-        return str(error)
-
-
-def _read(path: str, size: int) -> Array:
-    suffix = os.path.splitext(path)[1].lower()
+@lru_cache
+def _extremes(path: Path) -> Array:
+    size, suffix = _size(path), path.suffix.lower()
     if suffix not in READERS:
         raise RobotError(f"{path}: is not a supported mesh; use a {', '.join(READERS)} file")
     reader, most = READERS[suffix]
@@ -621,7 +577,7 @@ def _read(path: str, size: int) -> Array:
             if file.read(len(POINTER)) == POINTER:
                 raise RobotError(f"{path}: is a Git LFS pointer, not a mesh; run: git lfs pull")
             file.seek(0)
-            return _farthest(reader(file, size, path), path)
+            return _farthest(reader(file, size, str(path)), str(path))
     except OSError as error:
         raise RobotError(f"{path}: {error.strerror}") from None
 

@@ -67,19 +67,8 @@ def reads(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return seen
 
 
-def test_a_mesh_is_read_once_whatever_its_scale_and_again_when_it_changed(cube: Path, reads: list[str]) -> None:
-    first = hull(cube, (2, 2, 2))
-    assert hull(cube, (2, 2, 2)) is first
-    assert hull(cube, (1, -1, 1)) and bounds(cube) and data_uri(cube)
-    assert reads == [str(cube)]
-    os.utime(cube, ns=(0, 1))
-    hull(cube)
-    assert reads == [str(cube)] * 2
-
-
-def test_a_bad_mesh_is_read_once_too(cube: Path, reads: list[str]) -> None:
-    cube.write_bytes(STL[:-1])
-    assert refusal(cube) == refusal(cube)
+def test_a_mesh_is_read_once_whatever_its_scale(cube: Path, reads: list[str]) -> None:
+    assert hull(cube, (2, 2, 2)) and hull(cube, (1, -1, 1)) and bounds(cube) and data_uri(cube)
     assert reads == [str(cube)]
 
 
@@ -99,7 +88,7 @@ POINT = stl_of(1, np.ones(9))
 
 
 def test_a_bad_mesh_is_reported_in_one_line_with_its_file(tmp_path: Path) -> None:
-    for name, data, message in [
+    rows = [
         ("a.stl", b"", "is empty (0 bytes)"),
         ("a.dae", b"", "is empty (0 bytes)"),
         ("a.obj", b"", "is empty (0 bytes)"),
@@ -116,8 +105,9 @@ def test_a_bad_mesh_is_reported_in_one_line_with_its_file(tmp_path: Path) -> Non
         ("a.stl", POINT, "is 0 x 0 x 0 m, which has no volume; check its scale"),
         ("a.step", STL, "is not a supported mesh; use a .dae, .obj, .stl file"),
         ("a", STL, "is not a supported mesh; use a .dae, .obj, .stl file"),
-    ]:
-        path = tmp_path / name
+    ]
+    for number, (name, data, message) in enumerate(rows):
+        path = tmp_path / f"{number}{name}"
         path.write_bytes(data)
         assert refusal(path) == f"{path}: {message}"
 

@@ -102,13 +102,6 @@ def test_a_node_of_the_library_is_placed_by_its_name() -> None:
     assert bounds(dae(nodes=nodes, more=more))[0] == pytest.approx([2, 0, 0])
 
 
-def test_a_skin_is_its_geometry_moved_by_its_bind_shape() -> None:
-    bind = "<bind_shape_matrix>1 0 0 7  0 1 0 0  0 0 1 0  0 0 0 1</bind_shape_matrix>"
-    more = f'<library_controllers><controller id="c"><skin source="#g">{bind}</skin></controller></library_controllers>'
-    nodes = '<node><instance_controller url="#c"/></node>'
-    assert bounds(dae(nodes=nodes, more=more)) == pytest.approx(np.array([(7, 0, 0), (8, 2, 3)]))
-
-
 VERTEX = '<input semantic="VERTEX" source="#v" offset="1"/><input semantic="NORMAL" source="#s" offset="0"/>'
 
 
@@ -117,7 +110,6 @@ def test_only_the_vertices_that_faces_use_count_in_each_kind_of_faces() -> None:
         f"<triangles>{VERTEX}<p>7 0 7 1 7 2</p></triangles>",
         f"<polylist><vcount>3</vcount>{VERTEX}<p>7 0 7 1 7 2</p></polylist>",
         f"<polygons>{VERTEX}<p>7 0 7 1</p><ph><p>7 2 7 0</p></ph></polygons>",
-        f"<tristrips>{VERTEX}<p>7 0 7 1 7 2</p></tristrips>",
         f"<lines>{VERTEX}<p>7 5 7 4</p></lines><trifans>{VERTEX}<p>7 0 7 1 7 2</p></trifans>",
     ]:
         assert set(map(tuple, points(dae(faces=faces)))) == {(0, 0, 0), (0, 0, 3), (0, 2, 0)}

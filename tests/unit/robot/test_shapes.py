@@ -45,10 +45,6 @@ def test_a_collision_mesh_becomes_solid_and_other_shapes_stay_as_they_are(source
     assert solid(lost) is lost
 
 
-def test_a_hundred_robots_share_the_points_of_one_mesh(source: Source) -> None:
-    assert len({id(solid(shape(source, "box.stl")).points) for _ in range(100)}) == 1
-
-
 @pytest.mark.parametrize("data", [b"", STL[:-1], b"nonsense"])
 def test_a_bad_collision_mesh_is_a_warning_and_the_box_of_the_link_s_inertia(
     source: Source, home: Path, data: bytes
