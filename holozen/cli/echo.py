@@ -96,10 +96,8 @@ def _report_waiting(args: argparse.Namespace, bus: Node, nothing: str, printer: 
 
 
 def _hint(args: argparse.Namespace, bus: Node, printer: Printer) -> str:
-    if printer.stopped:
-        from holozen.cli.fields import lacking
-
-        return f"; {why}" if (why := lacking(args.filter, printer.stopped)) else ""
+    if printer.filter and printer.stopped:
+        return f"; {why}" if (why := printer.filter.lacking(printer.stopped)) else ""
     return suggest_key(bus, [args.key])
 
 
@@ -109,25 +107,25 @@ class Printer:
     def __init__(self, args: argparse.Namespace) -> None:
         self._args, self._many = args, "*" in args.key
         self._count = self._undecoded = self._fieldless = 0
-        self._path = self._passes = None
+        self._path = self.filter = None
         self.stopped: Any = None  # the last message that the filter rejected
         if args.field or args.filter:
             from holozen.cli import fields
 
             self._pick = fields.pick
             self._path = fields.path(args.field) if args.field else None
-            self._passes = fields.compiled(args.filter) if args.filter else None
+            self.filter = fields.Filter(args.filter) if args.filter else None
         self._short = args.truncate_length or args.no_arr or args.no_str
 
     def show(self, sample: Sample, value: Any) -> bool:
         """Print a value; returns whether it was shown. Raises LookupError if the field is missing."""
         if sample.is_deletion:  # it holds no message, so no filter passes it and it has no field
-            if not (self._passes or self._path):
+            if not (self.filter or self._path):
                 self._write(sample, {"deleted": True} if self._args.json else "(deleted)")
-            return not (self._passes or self._path)
+            return not (self.filter or self._path)
         self._count += 1
         self._undecoded += isinstance(value, Hex)
-        if self._passes and not self._passes(value):
+        if self.filter and not self.filter.passes(value):
             self.stopped = value
             return False
         if self._path:

@@ -1,16 +1,13 @@
 """Fields of messages: picked by a dotted path, such as `pose.pose.position.x`, or tested by an expression (`--filter`).
 
-An expression, such as `m.linear.x > 0.2 and not m.angular.z`, is a Python expression with comparisons, `and`, `or`,
-`not`, `in`, arithmetic without powers, `abs`, `len` and `[0]`; anything else is refused. `m` is the message, a bare
-name one of its fields. Before Python evaluates it, names and attributes become items of the message, so it can read
-nothing else and has no side effects.
+An expression, such as `m.linear.x > 0.2 and not m.angular.z`, is one of Python, as in ros2cli: its user could run any
+other program too. `m` is the message, a bare name one of its fields.
 """
 
-import ast
+import builtins
 import re
-import warnings
-from collections.abc import Callable, Iterator
-from typing import Any, NoReturn
+from types import SimpleNamespace
+from typing import Any
 
 from holozen.suggest import suggest
 
@@ -53,116 +50,54 @@ def _missing(value: Any, part: str | int) -> str:
     return f"no field {part!r}{suggest(str(part), names)}; there are {', '.join(names) or 'none'}"
 
 
-LONGEST = 1000  # characters of an expression
-MAX_NODES = 200  # parts of an expression
+class Fields(SimpleNamespace):
+    """A message: its fields are attributes, and also items, for names that Python reserves: `m["from"]`."""
 
-ALLOWED = (
-    ast.Compare, ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq, ast.In, ast.NotIn, ast.BoolOp, ast.And, ast.Or,
-    ast.UnaryOp, ast.Not, ast.USub, ast.BinOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Mod, ast.FloorDiv,
-    ast.Subscript, ast.Call, ast.Constant, ast.Name, ast.Attribute, ast.Load,
-)  # fmt: skip
-"""The parts that an expression may consist of."""
-CALLS: dict[str, Callable[[Any], Any]] = {"abs": abs, "len": len}
+    def __getitem__(self, name: str) -> Any:
+        return vars(self)[name]
 
 
-def compiled(text: str) -> Callable[[Any], bool]:
-    """The predicate of an expression. Raises ValueError with one line for an invalid one.
-
-    A message that lacks a field of the expression, or has a value of another type there, does not pass.
-    """
-    if len(text) > LONGEST:
-        raise ValueError(f"the filter is longer than {LONGEST} characters")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Python warns of such as 1[0], which no message passes
-        try:
-            tree = ast.parse(text.strip(), mode="eval")
-        except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
-            why = error.msg if isinstance(error, SyntaxError) else "nested too deeply"
-            raise ValueError(f"filter {text!r}: {why}; write one such as m.linear.x > 0.2") from None
-        if sum(1 for _ in ast.walk(tree.body)) > MAX_NODES:
-            raise ValueError(f"the filter has more than {MAX_NODES} parts")
-        tree.body = _Lookups(text.strip()).visit(tree.body)
-        code = compile(ast.fix_missing_locations(tree), "<filter>", "eval")
-    names = {"__builtins__": {}, "number": _number, **CALLS}
-
-    def passes(message: Any) -> bool:
-        try:
-            return bool(eval(code, names, {"m": message}))
-        except (LookupError, TypeError, ArithmeticError):
-            return False
-
-    return passes
+def _attributes(value: Any) -> Any:
+    """A value, with all messages in it as Fields."""
+    if isinstance(value, dict):
+        return Fields(**{name: _attributes(inner) for name, inner in value.items()})
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return [_attributes(inner) for inner in value]
+    return value
 
 
-def lacking(text: str, message: Any) -> str:
-    """An error line about the first field of an expression that `message` lacks, with the nearest one that it has;
-    empty if it lacks none.
-    """
-    for node in ast.walk(ast.parse(text.strip(), mode="eval").body):
-        if isinstance(node, ast.Attribute) or (isinstance(node, ast.Name) and node.id not in CALLS):
-            names = [*_chain(node)]
-            try:
-                pick(message, tuple(names[names[:1] == ["m"] :]))
-            except LookupError as error:
-                return str(error.args[0])
-    return ""
-
-
-def _chain(node: ast.expr) -> Iterator[str]:
-    """The names of a field's path; none if the path has anything but names."""
-    if isinstance(node, ast.Attribute) and (inner := [*_chain(node.value)]):
-        yield from [*inner, node.attr]
-    elif isinstance(node, ast.Name):
-        yield node.id
-
-
-class _Lookups(ast.NodeTransformer):
-    """Turns `m.linear.x` and `linear.x` into `m["linear"]["x"]`. Raises ValueError for a part that is not ALLOWED."""
+class Filter:
+    """An expression that a message passes or not. Raises ValueError with one line for an invalid one."""
 
     def __init__(self, text: str) -> None:
-        self._text = text
+        try:
+            self._code = compile(text.strip(), "<filter>", "eval")
+        except (SyntaxError, ValueError) as error:
+            why = error.msg if isinstance(error, SyntaxError) else error
+            raise ValueError(f"filter {text!r}: {why}; write one such as m.linear.x > 0.2") from None
 
-    def visit(self, node: ast.AST) -> Any:
-        """The replacement of a part."""
-        operators = (part for part in ast.iter_child_nodes(node) if not hasattr(part, "lineno"))
-        value = node.value if isinstance(node, ast.Constant) else None
-        is_plain = value is None or isinstance(value, bool | int | float | str)
-        if not is_plain or not all(isinstance(part, ALLOWED) for part in (node, *operators)):
-            self._refuse(node)
-        return super().visit(node)
+    def passes(self, message: Any) -> bool:
+        """Whether it is true of a message; false for one that lacks a field, or has a value of another type there."""
+        try:
+            return bool(self._value(message))
+        except Exception:
+            return False
 
-    def visit_Name(self, node: ast.Name) -> ast.expr:
-        """The message, or one of its fields."""
-        return node if node.id == "m" else _item(ast.Name("m", ast.Load()), node.id)
+    def lacking(self, message: Any) -> str:
+        """An error line about the first field that `message` lacks, with the nearest one that it has; empty if it lacks
+        none.
+        """
+        try:
+            self._value(message)
+        except AttributeError as error:
+            return _missing(vars(error.obj) if isinstance(error.obj, Fields) else error.obj, error.name or "")
+        except NameError as error:
+            return _missing(message, error.name or "")
+        except Exception:  # it has a value of another type
+            pass
+        return ""
 
-    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        """A field of a field."""
-        return _item(self.visit(node.value), node.attr)
-
-    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
-        """Arithmetic on numbers only: a string times a billion would fill the memory."""
-        left, right = (
-            ast.Call(ast.Name("number", ast.Load()), [self.visit(one)], []) for one in (node.left, node.right)
-        )
-        return ast.BinOp(left, node.op, right)
-
-    def visit_Call(self, node: ast.Call) -> ast.expr:
-        """A call of one of CALLS."""
-        if not isinstance(node.func, ast.Name) or node.func.id not in CALLS or len(node.args) != 1 or node.keywords:
-            self._refuse(node)
-        return ast.Call(node.func, [self.visit(node.args[0])], [])
-
-    def _refuse(self, node: ast.AST) -> NoReturn:
-        part = ast.get_source_segment(self._text, node) or self._text
-        raise ValueError(f"filter: {part!r} is not allowed; use fields, numbers, texts, comparisons,"
-                         " and, or, not, in, + - * / %, abs(), len()")  # fmt: skip
-
-
-def _item(owner: ast.expr, name: str) -> ast.expr:
-    return ast.Subscript(owner, ast.Constant(name), ast.Load())
-
-
-def _number(value: Any) -> float:
-    if not isinstance(value, int | float):
-        raise TypeError
-    return value
+    def _value(self, message: Any) -> Any:
+        fields = _attributes(message)
+        names = vars(fields) if isinstance(fields, Fields) else {}
+        return eval(self._code, {**names, "m": fields, "__builtins__": builtins})

@@ -1,12 +1,13 @@
-"""A filter is a small expression over fields, and nothing else."""
+"""A filter is an expression over the fields of a message."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from holozen.cli.fields import LONGEST, MAX_NODES, compiled, path, pick
+from holozen.cli.fields import Filter, path, pick
 
-MESSAGE = {"linear": {"x": 0.3, "y": 0}, "name": ["a", "b"], "frame_id": "odom", "m": 5, "ok": True, "from": 1}
+MESSAGE = {
+    "linear": {"x": 0.3, "y": 0}, "name": ["a", "b"], "frame_id": "odom", "m": 5, "ok": True, "from": 1,
+    "points": [{"x": 1}, {"x": 2}],
+}  # fmt: skip
 
 
 def test_a_true_expression_passes() -> None:
@@ -31,9 +32,12 @@ def test_a_true_expression_passes() -> None:
         "name == name",
         "linear.x / 3 < 1",
         "name[-1] == 'b'",
+        "any(each > 'a' for each in m.name)",
+        "frame_id.startswith('od')",
+        "points[1].x == 2",
     ]:
-        assert compiled(text)(MESSAGE) is True
-        assert compiled(f"not ({text})")(MESSAGE) is False
+        assert Filter(text).passes(MESSAGE) is True
+        assert Filter(f"not ({text})").passes(MESSAGE) is False
 
 
 def test_a_message_that_lacks_the_field_or_holds_something_else_does_not_pass() -> None:
@@ -43,73 +47,23 @@ def test_a_message_that_lacks_the_field_or_holds_something_else_does_not_pass() 
         "linear > 1",
         "name[5] == 'a'",
         "1 / 0 == 1",
-        "name + name",
-        "frame_id * 3",
         "-frame_id",
         "len(3)",
         "m.linear.x.y > 0",
-        "m.__class__",
         "name['a']",
     ]:
-        assert compiled(text)(MESSAGE) is False
+        assert Filter(text).passes(MESSAGE) is False
 
 
 def test_a_message_without_fields_does_not_pass() -> None:
     for message in ("text", [1, 2], None, 3.5):
-        assert compiled("linear.x > 0")(message) is False
+        assert Filter("linear.x > 0").passes(message) is False
 
 
-def test_anything_else_is_refused_in_one_line() -> None:
-    for text in [
-        "",
-        " ",
-        "linear.x >",
-        "(",
-        "a b",
-        "import os",
-        "x = 1",
-        "x := 1",
-        "__import__('os').system('true')",
-        "open('x')",
-        "lambda: 1",
-        "[x for x in name]",
-        "{1: 2}",
-        "[1]",
-        "(1, 2)",
-        "f'{m}'",
-        "linear.x ** 9",
-        "1 << 9",
-        "~1",
-        "+1",
-        "b'a'",
-        "name[0:1]",
-        "a if b else c",
-        "m.x()",
-        "abs(1, 2)",
-        "abs(x=1)",
-        "len(*name)",
-        "x is None",
-        "...",
-        "1j",
-        "await x",
-        "x" * (LONGEST + 1),
-        "(" * 300 + "1" + ")" * 300,
-        "1+" * (MAX_NODES // 2) + "1",
-        "\0",
-        "-" * 900 + "1",
-    ]:
-        with pytest.raises(ValueError) as error:
-            compiled(text)
-        assert str(error.value).startswith(("filter", "the filter"))
-
-
-@given(st.text("m.xy[]()<>=!+-*/%'\"0123456789 andortilf,:{}@&|^~\\", max_size=40))
-def test_no_text_does_more_than_pass_or_not(text: str) -> None:
-    try:
-        passes = compiled(text)
-    except ValueError:
-        return
-    assert passes(MESSAGE) in (True, False)
+def test_what_is_no_expression_is_refused_in_one_line() -> None:
+    for text in ["", " ", "linear.x >", "(", "a b", "import os", "x = 1", "\0"]:
+        with pytest.raises(ValueError, match=r"^filter .*; write one such as m.linear.x > 0.2$"):
+            Filter(text)
 
 
 def test_a_field_is_picked_by_its_path() -> None:
