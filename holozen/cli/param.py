@@ -35,7 +35,6 @@ LIST = "/list_parameters"
 
 _PLAIN = re.compile(r"/?[A-Za-z][A-Za-z0-9_./]*")
 _NO_NAMES = ("y", "n", "yes", "no", "on", "off", "true", "false", "null")  # not strings in YAML 1.1
-Word = bool | int | float | str
 
 
 class Nodes:
@@ -221,29 +220,15 @@ def _show(args: argparse.Namespace, row: dict[str, Any], *lines: str) -> None:
 
 
 def typed(text: str) -> Value:
-    """The value that a word denotes: true, false, a finite number, or a list of one type such as `[1.0, 2.5]`.
-
-    Anything else stays text, which a node that expects another type refuses.
+    """The value that a word has in a parameter file; what has none there stays text, which a node that expects another
+    type refuses.
     """
-    if text.startswith("["):
-        try:
-            found = parameter_yaml.parse(text)
-        except ValueError:
-            return text
-        return found if isinstance(found, list) else text
-    return _scalar(text)
-
-
-def _scalar(text: str) -> Word:
-    if text.lower() in ("true", "false"):
-        return text.lower() == "true"
-    if re.fullmatch(r"[+-]?[0-9]{1,18}", text):
-        return int(text)
     try:
-        value = float(text)
+        found = parameter_yaml.parse(text)
     except ValueError:
         return text
-    return value if math.isfinite(value) and "_" not in text else text
+    is_endless = isinstance(found, float) and not math.isfinite(found)
+    return text if is_endless or isinstance(found, dict) else found
 
 
 def file_lines(node: str, values: dict[str, Any]) -> list[str]:

@@ -87,7 +87,6 @@ def test_set_reports_in_one_line_the_reason_and_what_is_allowed(run: Run, node: 
         (("speed", "1e999"), "speed: '1e999': use a number from 0.1 to 2 m/s"),
         (("speed", "true"), "speed: True: use a number from 0.1 to 2 m/s"),
         (("speed", ""), "speed: '': use a number from 0.1 to 2 m/s"),
-        (("speed", "99999999999999999999"), "speed: 1e+20: use a number from 0.1 to 2 m/s"),
         (("sped", "1"), "sim has no parameter 'sped' (did you mean 'speed'?)"),
     ]:
         assert run("set", "sim", *words) == (1, "", f"holozen param set: setting parameter failed: {expected}\n")
