@@ -515,10 +515,8 @@ def data_hull(uri: str, scale: Vector = UNSCALED) -> tuple[Vector, ...]:
 @lru_cache
 def file_uri(path: Path) -> str:
     """A whole mesh file, compressed, as a `data:` URI to replace its name, for viewers. Raises RobotError."""
-    size, kind = (
-        _size(path),
-        KINDS.get(os.path.splitext(os.path.realpath(path))[1].lower()),
-    )  # a link may lead elsewhere
+    size = _size(path)
+    kind = KINDS.get(os.path.splitext(os.path.realpath(path))[1].lower())  # a link may lead to private data
     if kind is None or not 0 < size <= MAX_SHOWN:
         raise RobotError(f"{path}: a mesh to show is a {', '.join(KINDS)} file of up to {MAX_SHOWN / 1e6:.0f} MB")
     try:
