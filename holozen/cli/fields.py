@@ -72,8 +72,8 @@ class Filter:
     def __init__(self, text: str) -> None:
         try:
             self._code = compile(text.strip(), "<filter>", "eval")
-        except (SyntaxError, ValueError) as error:
-            why = error.msg if isinstance(error, SyntaxError) else error
+        except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+            why = error.msg if isinstance(error, SyntaxError) else "nested too deeply"
             raise ValueError(f"filter {text!r}: {why}; write one such as m.linear.x > 0.2") from None
 
     def passes(self, message: Any) -> bool:
