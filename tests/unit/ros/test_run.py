@@ -158,6 +158,15 @@ rclpy.spin(node)
     assert done.stderr.count("  File ") == 2
 
 
+def test_frames_of_pythons_own_import_and_contexts_are_left_out(run: Run, write: Write, my_bot: Path) -> None:
+    write("src/my_bot/setup.py", "setup(entry_points={'console_scripts': ['b = my_bot.b:main']})")
+    write("src/my_bot/my_bot/__init__.py")
+    write("src/my_bot/my_bot/b.py", "import rclpy\nrclpy.init()\nrclpy.spin(rclpy.node.Node)")
+    done = run("my_bot", "b")
+    assert done.stderr.endswith("TypeError: pass a node, such as Node(), not the class\n")
+    assert done.stderr.count("  File ") == 1
+
+
 def test_a_name_that_is_not_there_is_reported_in_the_users_traceback(run: Run, write: Write) -> None:
     write("a.py", "from geometry_msgs.msg import Twost\n")
     done = run("a.py")
