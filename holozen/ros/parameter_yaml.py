@@ -140,6 +140,8 @@ class Section(NamedTuple):
 
     place: str
     values: dict[str, Value]
+    typed: bool = False
+    """Whether it was given on the command line, and not in a file, which may be for other programs too."""
 
     def is_for(self, full_name: str) -> bool:
         """Whether it is for the node with that absolute name."""
@@ -155,7 +157,7 @@ def assigned(text: str) -> Section:
     if not name or (colon and not node):
         raise ValueError("write NAME:=VALUE, or NODE:NAME:=VALUE")
     value = parse(rest)
-    return Section(_place(node) if node else EVERY_NODE, dict(_flat({name: value}, "")))
+    return Section(_place(node) if node else EVERY_NODE, dict(_flat({name: value}, "")), typed=True)
 
 
 def read(path: str) -> list[Section]:

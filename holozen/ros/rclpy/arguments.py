@@ -49,11 +49,11 @@ class Arguments:
                 return names.expand(rule.replacement, node, namespace, kind=kind)
         return full_name
 
-    def parameters_for(self, full_name: str) -> dict[str, Value]:
-        """The parameter values for a node. Of two values for one name the later wins."""
+    def parameters_for(self, full_name: str, typed: bool = False) -> dict[str, Value]:
+        """The parameter values for a node, or only those `typed`. Of two values for one name the later wins."""
         found: dict[str, Value] = {}
         for section in self.sections:
-            if section.is_for(full_name):
+            if section.is_for(full_name) and section.typed >= typed:
                 found |= section.values
         return found
 

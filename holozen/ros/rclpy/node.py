@@ -38,7 +38,7 @@ from holozen.ros.rclpy.service import Service
 from holozen.ros.rclpy.subscription import Subscription
 from holozen.ros.rclpy.timer import Rate, Timer
 from holozen.ros.rclpy.waitable import GuardCondition, Waitable, check_callback
-from holozen.suggest import article
+from holozen.suggest import article, suggest
 from holozen.transport import session
 from holozen.transport.graph import Endpoint
 from holozen.transport.parameters import is_below
@@ -93,6 +93,7 @@ class _State(NodeHandle):
         self._has_left = False
         self._calls: list[threading.Thread] = []
         self._lookout: Lookout | None = None
+        self._typed = arguments.parameters_for(self.full_name, typed=True)
         context.opened(self)
 
     def all(self, kind: type[T]) -> list[T]:
@@ -112,6 +113,15 @@ class _State(NodeHandle):
         if self.executor is not None:
             self.executor.changed()
         return made
+
+    def report_undeclared(self) -> None:
+        """Warn, once, of parameters of the command line that neither this node nor another one here declares."""
+        typed, self._typed = self._typed, {}
+        stores = [one.store for one in self.context.all_open() if isinstance(one, _State) and hasattr(one, "store")]
+        declared = {name for store in stores for name in store.values}
+        for name in typed if not self.store.allow_undeclared else ():
+            if name not in declared:
+                self.logger.warning(f"parameter {name!r} is given, but not declared{suggest(name, self.store.values)}")
 
     def disown(self, made: Any) -> bool:
         """Destroy something. Returns whether it belonged to this node."""
@@ -249,6 +259,7 @@ class Node(HelpfulAttributes):
             before.remove_node(self)
         if value is not None:
             value.add_node(self)
+            self._holozen.report_undeclared()
 
     publishers = _owned(Publisher, "Its publishers.")
     subscriptions = _owned(Subscription, "Its subscriptions.")
