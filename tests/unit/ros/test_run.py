@@ -60,7 +60,7 @@ def test_it_has_what_python_gives_every_script(run: Run, write: Write) -> None:
         ("teleop_twist_keyboard teleop_twist_keyboard", "use `holozen teleop`"),
         ("rviz2 rviz2 -d a.rviz", "use `holozen view` or `holozen map`"),
         ("rviz2", "rviz2 is not run here: use `holozen view` or `holozen map`"),
-        ("gazebo_ros spawn_entity.py -entity Fred", "use `holozen spawn`"),
+        ("gazebo_ros spawn_model -urdf -model Fred -file a.urdf", "use `holozen spawn -urdf -model Fred -file a.urdf`"),
         ("gazebo_ros gzserver", "use `holozen sim --empty`"),
         ("gazebo_ros gzclient", "use `holozen view` or `holozen map`"),
         ("tf2_tools view_frames", "tf2_tools view_frames is not run here: use `holozen view` or `holozen tf echo`"),
