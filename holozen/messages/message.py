@@ -53,7 +53,8 @@ def listed(value: Any) -> list[Any]:
     """An array as a list, which the wire carries instead. Raises TypeError for anything else."""
     if isinstance(value, array):
         return value.tolist()
-    raise TypeError(f"a message cannot hold a {type(value).__name__}")
+    numpys = "; its tolist() is what one can" if hasattr(value, "tolist") else ""
+    raise TypeError(f"a message cannot hold a {type(value).__name__}{numpys}")
 
 
 def not_finite(message: Message) -> str:

@@ -405,6 +405,8 @@ def test_our_own_message_is_the_same_bytes() -> None:
 
 
 def test_an_array_is_nothing_for_a_field_of_another_type() -> None:
+    with pytest.raises(TypeError, match=r"^a message cannot hold a float32; its tolist\(\) is what one can$"):
+        encode(m.Vector3(x=np.float32(1)))  # type: ignore[arg-type]
     with pytest.raises(TypeError, match=r"^a message cannot hold a complex$"):
         encode(m.TriggerReply(message=1j))  # type: ignore[arg-type]
     assert msgspec.json.decode(encode(IMAGE(data=b"\1\2")))["data"] == [1, 2]
