@@ -117,11 +117,12 @@ class _State(NodeHandle):
     def report_undeclared(self) -> None:
         """Warn, once, of parameters of the command line that neither this node nor another one here declares."""
         typed, self._typed = self._typed, {}
+        if not typed or self.store.allow_undeclared:
+            return
         stores = [one.store for one in self.context.all_open() if isinstance(one, _State) and hasattr(one, "store")]
         declared = {name for store in stores for name in store.values}
-        for name in typed if not self.store.allow_undeclared else ():
-            if name not in declared:
-                self.logger.warning(f"parameter {name!r} is given, but not declared{suggest(name, self.store.values)}")
+        for name in sorted(typed.keys() - declared):
+            self.logger.warning(f"parameter {name!r} is given, but not declared{suggest(name, self.store.values)}")
 
     def disown(self, made: Any) -> bool:
         """Destroy something. Returns whether it belonged to this node."""
