@@ -140,8 +140,8 @@ class Section(NamedTuple):
 
     place: str
     values: dict[str, Value]
-    typed: bool = False
-    """Whether it was given on the command line, and not in a file, which may be for other programs too."""
+    file: str = ""
+    """The file that it is from; empty for one of the command line."""
 
     def is_for(self, full_name: str) -> bool:
         """Whether it is for the node with that absolute name."""
@@ -157,7 +157,7 @@ def assigned(text: str) -> Section:
     if not name or (colon and not node):
         raise ValueError("write NAME:=VALUE, or NODE:NAME:=VALUE")
     value = parse(rest)
-    return Section(_place(node) if node else EVERY_NODE, dict(_flat({name: value}, "")), typed=True)
+    return Section(_place(node) if node else EVERY_NODE, dict(_flat({name: value}, "")))
 
 
 def read(path: str) -> list[Section]:
@@ -173,7 +173,7 @@ def read(path: str) -> list[Section]:
         found = list(_sections(document(text), ""))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-    return sorted(found, key=lambda section: "*" not in section.place)
+    return sorted((each._replace(file=path) for each in found), key=lambda section: "*" not in section.place)
 
 
 def _sections(node: dict[str, Any], place: str) -> Iterator[Section]:

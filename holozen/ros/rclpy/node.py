@@ -38,7 +38,7 @@ from holozen.ros.rclpy.service import Service
 from holozen.ros.rclpy.subscription import Subscription
 from holozen.ros.rclpy.timer import Rate, Timer
 from holozen.ros.rclpy.waitable import GuardCondition, Waitable, check_callback
-from holozen.suggest import article, suggest
+from holozen.suggest import article
 from holozen.transport import session
 from holozen.transport.graph import Endpoint
 from holozen.transport.parameters import is_below
@@ -93,7 +93,7 @@ class _State(NodeHandle):
         self._has_left = False
         self._calls: list[threading.Thread] = []
         self._lookout: Lookout | None = None
-        self._typed = arguments.parameters_for(self.full_name, typed=True)
+        self._has_reported = False
         context.opened(self)
 
     def all(self, kind: type[T]) -> list[T]:
@@ -114,15 +114,15 @@ class _State(NodeHandle):
             self.executor.changed()
         return made
 
-    def report_undeclared(self) -> None:
-        """Warn, once, of parameters of the command line that neither this node nor another one here declares."""
-        typed, self._typed = self._typed, {}
-        if not typed or self.store.allow_undeclared:
+    def report_unused(self) -> None:
+        """Warn, once, of parameters from outside that no node of this process declares."""
+        if self._has_reported or not self.arguments.sections or self.store.allow_undeclared:
             return
-        stores = [one.store for one in self.context.all_open() if isinstance(one, _State) and hasattr(one, "store")]
-        declared = {name for store in stores for name in store.values}
-        for name in sorted(typed.keys() - declared):
-            self.logger.warning(f"parameter {name!r} is given, but not declared{suggest(name, self.store.values)}")
+        self._has_reported = True
+        nodes = [one for one in self.context.all_open() if isinstance(one, _State) and hasattr(one, "store")]
+        declared = {name for node in nodes for name in node.store.values}
+        for line in self.arguments.unused({node.full_name for node in nodes}, declared):
+            self.logger.warning(line)
 
     def disown(self, made: Any) -> bool:
         """Destroy something. Returns whether it belonged to this node."""
@@ -260,7 +260,7 @@ class Node(HelpfulAttributes):
             before.remove_node(self)
         if value is not None:
             value.add_node(self)
-            self._holozen.report_undeclared()
+            self._holozen.report_unused()
 
     publishers = _owned(Publisher, "Its publishers.")
     subscriptions = _owned(Subscription, "Its subscriptions.")
