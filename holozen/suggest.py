@@ -37,7 +37,7 @@ def closest(word: str, known: Iterable[str], part: Callable[[str], str] = str, a
     def likeness(name: str) -> float:
         other = part(name).casefold()[:LONGEST]
         found = 0.7 if len(plain) > 2 and plain in other else 0.0
-        for text, share in ((other, 1.0), (other[: len(plain)], 0.95)):
+        for text, share in ((other, 1.0), (other[: len(plain)] if len(plain) > 1 else "", 0.95)):
             matcher.set_seq1(text)
             if share * matcher.quick_ratio() > alike:
                 found = max(found, share * matcher.ratio())

@@ -88,6 +88,7 @@ EXAMPLES = {
     "wheel-load": Example(f"<collision>{_BODY.replace('0.02', '0')}</collision>", f"<collision>{_BODY}</collision>"),
     "overlap": Example(_LEFT.replace("0.12", "0.09"), _LEFT),
     "wheel-side": Example("<leftJoint>right_joint</leftJoint><rightJoint>left_joint</rightJoint>", _JOINTS),
+    "wheel-forward": Example(_LEFT.replace("0 1 0", "0 -1 0"), _LEFT),
     "wheel-measure": Example("<wheelSeparation>0.12</wheelSeparation>", "<wheelSeparation>0.24</wheelSeparation>"),
     "plugin-name": Example(_DRIVE.replace("diff", "dif"), _DRIVE),
     "plugin": Example(f'<plugin name="mine" filename="libmy_magic.so"/> {_DRIVE}', _DRIVE),

@@ -348,6 +348,18 @@ def _sides(subject: Subject) -> Iterator[Mistake]:
         yield Mistake(at, f"on the opposite side of its tag: {names}; left is where y is larger", "swap them")
 
 
+@rule("wheel-forward", "warning", "a wheel whose axis points to the right", "Gazebo turns it backwards")
+def _backward(subject: Subject) -> Iterator[Mistake]:
+    """Here a wheel drives forward whatever its sign."""
+    drive = _driven(subject)
+    axes = joint_axes(subject.loaded) if drive else {}
+    for name in (*drive.left, *drive.right) if drive and _level(drive, subject) else ():
+        if axes[name].direction[1] < 0:
+            way = _direction(np.array(axes[name].direction))
+            problem = f"joint {name!r} turns about {way}; forward is about (0 1 0)"
+            yield Mistake(subject.joints[name], problem, "negate its <axis> (directions in the root frame)")
+
+
 @rule("wheel-measure", "warning", "a plugin's wheel separation or diameter that differs by 20 % from the robot's",
       "it turns or drives faster or slower than commanded")  # fmt: skip
 def _measures(subject: Subject) -> Iterator[Mistake]:

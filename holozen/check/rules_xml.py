@@ -186,6 +186,7 @@ def _misplaced(subject: Subject) -> Iterator[Mistake]:
 def _ignored(subject: Subject) -> Iterator[Mistake]:
     """Except misspellings of elements that URDF has there. Of elements that are there once the first counts."""
     spelt = {mistake.at for mistake in _misspelt_tags.find(subject)}
+    macros = {tag.attributes.get("name") for source in subject.sources for tag in source.root.all("xacro:macro")}
     for parent in _urdf_elements(subject):
         known = URDF[parent.name].children
         if parent.name not in FREE and (text := parent.text.strip()):
@@ -196,6 +197,7 @@ def _ignored(subject: Subject) -> Iterator[Mistake]:
             if tag.name in known or tag.name in MISPLACED or ":" in tag.name or tag in spelt:
                 continue
             fix = IGNORED.get(tag.name, f"remove it, or write one of {listed(sorted(known))}" if known else "remove it")
+            fix = f"write <xacro:{tag.name}> to call the macro" if tag.name in macros else fix
             yield Mistake(tag, f"<{tag.name}> in {parent} is not read", fix)
 
 

@@ -61,6 +61,7 @@ ELSEWHERE = {
     "spawn_entity.py": "write `holozen spawn`", "gzserver": "write `holozen sim`",
     "check_urdf": "write `holozen check`",
     "build": "nothing is built here: packages are read as they are", "colcon": "nothing is built here",
+    "catkin_make": "nothing is built here", "view_frames": "`holozen view` draws the frames",
     "rqt_graph": "write `holozen graph`", "wtf": "write `holozen doctor`", "msg": _TYPES, "srv": _TYPES,
     "gazebo": "write `holozen sim`", "gz": "write `holozen sim`", "teleop_twist_keyboard": "write `holozen teleop`",
     "start": "write `holozen up`", "down": "Ctrl-C ends `holozen up`; `holozen stop` stops robots",
@@ -69,6 +70,8 @@ ELSEWHERE = {
     "rostopic": "write `holozen topic`", "rosservice": "write `holozen service`", "rosnode": "write `holozen node`",
     "rosparam": "write `holozen param`", "rosbag": "write `holozen bag`", "rosrun": "write `holozen run`",
     "roslaunch": "write `holozen launch`", "roscore": "none is needed; `holozen up` starts a robot",
+    "call": "write `holozen service call`",
+    **{verb: f"write `holozen topic {verb}`" for verb in ("echo", "pub", "hz", "bw", "delay")},
 }  # fmt: skip
 """Verbs of ROS's tools and other likely guesses, with what to use instead."""
 EXTRAS = (
@@ -151,10 +154,16 @@ def _main(words: list[str]) -> int:
         from holozen.cli.completion import complete
 
         return complete(words[1:], VERBS, command)
-    if words[0] not in VERBS:
+    after_ros2 = words[1] if words[0] == "ros2" and words[1:] else ""
+    if after_ros2 in ELSEWHERE:
+        words = words[1:]
+    if words[0] not in VERBS or after_ros2 in VERBS:
         from holozen.console import report
         from holozen.suggest import suggest
 
+        if after_ros2 in VERBS:
+            report(f"holozen ros2: this joins ROS 2 nodes; write `holozen {after_ros2}`; see `holozen ros2 --help`")
+            return 2
         instead = ELSEWHERE.get(words[0])
         hint = f"; {instead}" if instead else suggest(words[0], VERBS)
         report(f"holozen: no verb {words[0]!r}{hint}; `holozen --help` lists the verbs")

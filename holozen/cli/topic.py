@@ -75,6 +75,8 @@ def _echo_arguments(parser: argparse.ArgumentParser) -> None:
     add("--filter", metavar="EXPR", help="only messages of which this is true, such as 'm.linear.x > 0.2'")
     add("--csv", action="store_true", help="values separated by commas, one message per line")
     add("--raw", action="store_true", help="the bytes as they came; on a terminal, escaped")
+    add("-n", action=Instead, advice="--once ends after the first message")
+    add("-p", action=Instead, advice="--csv prints a message on one line")
     add("--flow-style", action=Instead, advice="--json prints each message on one line")
     add("--no-arr", action="store_true", help="only the length of lists")
     add("--no-str", action="store_true", help="only the length of texts")

@@ -47,10 +47,12 @@ _ROS2 = {
 
 ELSEWHERE = {
     "interface package": "write `holozen interface list`", "interface packages": "write `holozen interface list`",
+    "sim start": "`holozen sim` starts one, `holozen sim play` continues a paused one",
+    "sim stop": "`holozen sim pause` pauses it, `holozen stop` stops robots, Ctrl-C ends it",
     "param delete": "a parameter is there as long as its node", "service echo": "services cannot be watched here",
     "tf view_frames": "`holozen view` draws the frames", "tf monitor": "write `holozen topic hz tf`",
 }  # fmt: skip
-"""Verbs of ros2 behind our nouns, with what to use instead."""
+"""Verbs of ros2 behind our nouns and other likely guesses, with what to use instead."""
 
 DURABILITIES = ("system_default", "transient_local", "volatile", "unknown", "best_available")
 _POLICIES = {
@@ -131,10 +133,14 @@ class Noun:
         """Run the verb that `argv` starts with."""
         if argv and argv[0] in self.modules:
             return self.verb(argv[0]).main(argv[1:])
-        if instead := ELSEWHERE.get(" ".join([self.name, *argv[:1]])):
-            self.parser().error(f"no verb {argv[0]!r}; {instead}")
+        self._check_here(argv)
         self.parser().parse_args(argv)
         return 2
+
+    def _check_here(self, argv: list[str]) -> None:
+        """Exits with code 2 for a verb of ELSEWHERE."""
+        if instead := ELSEWHERE.get(" ".join([self.name, *argv[:1]])):
+            self.parser().error(f"no verb {argv[0]!r}; {instead}")
 
     def parser(self) -> Parser:
         """The parser of all its verbs."""
@@ -163,6 +169,7 @@ class Service(Noun):
         """Run the verb that `argv` starts with, or else the service."""
         if argv and argv[0] in self.modules:
             return super().main(argv)
+        self._check_here(argv)
         if argv and argv[0][:1] != "-" and (near := suggest(argv[0], self.modules)):
             self.parser().error(f"no verb {argv[0]!r}{near}")
         return int(self.module.main(argv))

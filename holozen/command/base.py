@@ -18,7 +18,7 @@ from holozen.odometry import odometry, transform
 from holozen.rotation import from_axis_angle
 from holozen.transport.graph import Endpoint, on_key
 from holozen.transport.pubsub import Subscription
-from holozen.wire import COMMAND_SILENCE, MAX_COMMAND_BYTES, key_for
+from holozen.wire import COMMAND_SILENCE, MAX_COMMAND_BYTES, key_for, robot_name
 
 STATUS_EVERY = 0.1  # s
 PATIENCE = 0.5  # s for the nodes that are there to be discovered
@@ -36,8 +36,9 @@ class Base:
     next base of the same name on the same network is still stopped. Raises BusError if another process, a base or a
     sim, serves the robot already.
 
-    `timeout` is the silence in s after which the robot stops, up to 2, else ValueError. Commands beyond the limits, in
-    m/s and rad/s, are clamped. `bus` has to be a lasting one, so that other nodes discover its node.
+    `timeout` is the silence in s after which the robot stops, up to 2. Commands beyond the limits, in m/s and rad/s,
+    are clamped. Raises ValueError for any other timeout, for a limit that is negative or not finite, and for what is no
+    name of a robot. `bus` has to be a lasting one, so that other nodes discover its node.
     """
 
     def __init__(
@@ -50,11 +51,14 @@ class Base:
         max_angular: float = MAX_ANGULAR,
         frame: str = "odom",
         base_frame: str = "base_link",
-        state: Path | None = None,
+        state: Path | str | None = None,
     ) -> None:
         if not 0 < timeout <= 2:
             raise ValueError(f"timeout is {timeout:g} s; a robot stops after 2 s of silence at the latest")
-        self._bus, self._robot = bus, robot
+        for name, limit, unit in (("max_linear", max_linear, "m/s"), ("max_angular", max_angular, "rad/s")):
+            if not 0 <= limit < math.inf:
+                raise ValueError(f"{name} is {limit:g} {unit}; use 0 or more, such as 0.3")
+        self._bus, self._robot = bus, robot and robot_name(robot)
         self._graph, self._is_member = bus.graph(), bus.member is not None
         self._graph.settled(bus.connected, max(PATIENCE, bus.took))
         odom, others = key_for("odom", robot), self._other_servers()
@@ -78,7 +82,7 @@ class Base:
         self._reads, self._key, self._name = ReadTimes(now), key, robot or bus.node
         self._frames = key_for(frame, robot), key_for(base_frame, robot)
         self._pose, self._moved_at, self._status_at = (0.0, 0.0, 0.0), now, -math.inf
-        folder = state or default_folder()
+        folder = Path(state) if state else default_folder()
         self._stops = StopFiles(folder, bus.networks, bus.node) if folder else None
         if self._stops and (by := self._stops.read(robot)):
             self._arbiter.stop(by, now)

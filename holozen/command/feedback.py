@@ -118,12 +118,14 @@ class CommandFeedback:
                 return
 
     def report_held(self) -> None:
-        """After a stop was sent while another source drove: report that it holds that one, if it does."""
+        """After a stop was sent while another source drove: report that it holds that one, if it does and is there."""
         deadline = time.monotonic() + HOLDING
         while self._driver and (left := deadline - time.monotonic()) > 0:
             status, _ = self._latest.read()
             if status and any(each.source == self._driver and each.held for each in status.sources):
-                return self._report(HOLDS.format(driver=self._driver, command=self._resume))
+                if not self._more(self._driver):
+                    self._report(HOLDS.format(driver=self._driver, command=self._resume))
+                return
             self._latest.wait(self._latest.count, left)
 
     def _verdict(self, status: Any) -> str | None:

@@ -27,11 +27,15 @@ else:
     )  # fmt: skip
 
     def __getattr__(name: str) -> Any:
-        if name[0].isupper():
-            import importlib
+        import importlib
 
-            for module in MODULES:
-                if found := vars(importlib.import_module(f"{__name__}.{module}")).get(name):
+        modules = (vars(importlib.import_module(f"{__name__}.{module}")) for module in MODULES)
+        if name == "__all__":  # of `from holozen.messages import *`
+            structs = {each for module in modules for each in module if hasattr(module[each], "__struct_fields__")}
+            return sorted(structs - {"Struct"})
+        if name[0].isupper():
+            for module in modules:
+                if found := module.get(name):
                     return globals().setdefault(name, found)
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 

@@ -350,9 +350,10 @@ def completed(interface: Interface, value: Any, path: str = "", tolerant: bool =
     whose value has the wrong type, range or length. If `tolerant`, fields that do not exist are left out. NaN and
     infinities are numbers. A mapping stands for a list of pairs.
     """
-    if not isinstance(value, dict):
-        raise InterfaceError(f"{path or interface.name}: {shorten(repr(value))} is not a mapping of fields")
     names = [field.name for field in interface.fields]
+    if not isinstance(value, dict):
+        fix = f"; write {{{shorten(': ..., '.join(names))}: ...}}" if names else ""
+        raise InterfaceError(f"{path or interface.name}: {shorten(repr(value))} is not a mapping of fields{fix}")
     for name in value:
         if name not in names and not tolerant:
             where = f"{path}.{name}" if path else f"{name}"

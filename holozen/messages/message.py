@@ -49,9 +49,11 @@ def packed(code: str, values: Sequence[Any]) -> "array[Any]":
     return made
 
 
-def listed(value: Any) -> list[Any]:
-    """An array as a list, which the wire carries instead. Raises TypeError for anything else."""
-    if isinstance(value, array):
+def listed(value: Any) -> Any:
+    """An array as a list, and a number of numpy as one of Python, which the wire carries instead. Raises TypeError for
+    anything else.
+    """
+    if hasattr(value, "tolist"):
         return value.tolist()
     raise TypeError(f"a message cannot hold a {type(value).__name__}")
 
@@ -61,8 +63,8 @@ def not_finite(message: Message) -> str:
     return limits.not_finite(msgspec.to_builtins(message, enc_hook=_suspects))
 
 
-def _suspects(value: Any) -> list[Any]:
-    """An array as a list if one of its numbers may not be finite, else an empty list. Raises TypeError."""
+def _suspects(value: Any) -> Any:
+    """As `listed`, but an array is an empty list unless one of its numbers may not be finite. Raises TypeError."""
     if isinstance(value, array) and (value.typecode not in "fd" or math.isfinite(sum(value))):
         return []
     return listed(value)

@@ -192,8 +192,9 @@ class Trace:
             return
         del self.calls[depth:]
         if unknown:
-            bare = any(each.getAttribute("name") == node.tagName[6:] for each in _plain_macros(node.ownerDocument))
-            error.hint = PLAIN_MACRO if bare else suggest(node.tagName[6:], names(macros))
+            name = node.tagName[6:]
+            elsewhere = _plain(node, "macro", name) or _further_down(node, "macro", name)
+            error.hint = elsewhere or suggest(name, names(macros))
             return
         params = [param.lstrip("*") for param in error.macros[0].params]
         wrong = words.split('"')[1] if words.startswith("Invalid parameter ") else ""
@@ -225,8 +226,9 @@ class Trace:
                 return function(text, *tables)
             except NameError as error:
                 if error.name and tables and not hasattr(error, "hint"):
-                    plain = _in_plain_macro(self._element) or _plain_property(self._element, error.name)
-                    near = plain or suggest(error.name, names(tables[0]))
+                    node, name = self._element, error.name
+                    plain = _in_plain_macro(node) or _plain(node, "property", name)
+                    near = plain or _further_down(node, "property", name) or suggest(name, names(tables[0]))
                     error.hint = near  # type: ignore[attr-defined]
                 raise
             except TypeError as error:
@@ -238,28 +240,38 @@ class Trace:
         return wrapped
 
 
-PLAIN_MACRO = "; <macro> lacks its prefix: write <xacro:macro ...> ... </xacro:macro>"
-PLAIN_PROPERTY = "; <property> lacks its prefix: write <xacro:property ...>"
+PLAIN = {
+    "macro": "; <macro> lacks its prefix: write <xacro:macro ...> ... </xacro:macro>",
+    "property": "; <property> lacks its prefix: write <xacro:property ...>",
+}
 _NO_COMMAND = re.compile(r"Unknown substitution command \[(.+?)\]")
 COMMANDS = ("find", "env", "optenv", "dirname", "arg")
 
 
-def _plain_macros(document: Any) -> Any:
-    return document.getElementsByTagName("macro") if document else ()
+def _named(node: Any, tag: str, name: str) -> Any:
+    """The first element with that tag and that name in the document of `node`; None if there is none."""
+    document = node.ownerDocument if node is not None else None
+    found = document.getElementsByTagName(tag) if document else ()
+    return next((each for each in found if each.getAttribute("name") == name), None)
 
 
 def _in_plain_macro(node: Any) -> str:
     """A hint for an expression inside a `<macro>`, which defines none, so that its parameters have no values."""
     while node is not None and node.nodeName != "macro":
         node = node.parentNode
-    return PLAIN_MACRO if node is not None else ""
+    return PLAIN["macro"] if node is not None else ""
 
 
-def _plain_property(node: Any, name: str) -> str:
-    """A hint for a name that a `<property>` without prefix gives, which defines none."""
-    document = node.ownerDocument if node is not None else None
-    found = document.getElementsByTagName("property") if document else ()
-    return PLAIN_PROPERTY if any(each.getAttribute("name") == name for each in found) else ""
+def _plain(node: Any, kind: str, name: str) -> str:
+    """A hint for a name that a `<macro>` or `<property>` without prefix gives, which defines none."""
+    return PLAIN[kind] if _named(node, kind, name) is not None else ""
+
+
+def _further_down(node: Any, kind: str, name: str) -> str:
+    """A hint for a name whose definition comes later: what xacro has read is no longer in the document."""
+    found = _named(node, f"xacro:{kind}", name)
+    place = place_of(found) if found is not None and found.parentNode.nodeName != "xacro:macro" else None
+    return f"; it is defined further down, in line {place.line}: move that up" if place else ""
 
 
 def _no_number(expression: str, table: Any) -> str:

@@ -115,6 +115,8 @@ HINTS = {
     "actionlib": f"{ROS_1}, which has actions in rclpy.action",
     "ament_index_python.resources": "ament_index_python.packages finds the folders of packages",
     "cv_bridge": "numpy.frombuffer(image.data, 'uint8').reshape(image.height, image.width, -1) is a colour image",
+    "cv2": "pip install opencv-python-headless",
+    "gazebo_msgs.srv": "simulation_interfaces.srv has SpawnEntity, DeleteEntity, GetEntityState and SetEntityState",
     "interactive_markers": "there are no interactive markers here; a topic or a service can set what a marker would",
     "launch_ros.actions.ComposableNodeContainer": COMPONENTS,
     "launch_ros.actions.LifecycleNode": "there are no lifecycle nodes here; use Node",
@@ -128,6 +130,7 @@ HINTS = {
     "nav2_common": NAV2,
     "nav2_simple_commander": NAV2,
     "rclpy.lifecycle": "there are no lifecycle nodes here; use rclpy.node.Node",
+    "rclpy.parameter_client": "create_client(SetParameters, '/NODE/set_parameters') calls it, of rcl_interfaces.srv",
     "rclpy_components": COMPONENTS,
     "rclpy.serialization": "holozen.messages.codec.encode and decode do this",
     "rosbag2_py": "`holozen record` and `holozen replay` do this",
@@ -157,9 +160,9 @@ NODE_HINTS = {
 """An attribute of ROS's Node that does not exist here -> what to use instead."""
 
 INTERNAL = {
-    "arm", "beginning_execution", "changed", "check_running", "check_can_publish", "check_signal", "close_all",
-    "closed", "detach", "ending_execution", "entities", "interrupt", "is_passed", "opened", "sleep_nanoseconds",
-    "take", "threads", "unwatch", "watch",
+    "all_open", "arm", "beginning_execution", "changed", "check_running", "check_can_publish", "check_signal",
+    "close_all", "closed", "detach", "ending_execution", "entities", "interrupt", "is_passed", "opened",
+    "sleep_nanoseconds", "take", "threads", "unwatch", "watch",
 }  # fmt: skip
 """Public methods that our classes have for one another, and that are not part of rclpy."""
 

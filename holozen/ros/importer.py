@@ -20,7 +20,7 @@ from holozen.messages.registry import KINDS, Places, Registry, tables
 from holozen.robot.packages import folders_above, local_packages
 from holozen.ros import generated
 from holozen.ros.catalog import HINTS, MESSAGES, MODULES, PAGE, REEXPORTS
-from holozen.suggest import suggest
+from holozen.suggest import closest, suggest
 
 _SUFFIXES = ("_msgs", "_srvs", "_interfaces", "_interface", "_msg", "_srv")  # of names that only interfaces have
 _TOP_LEVEL = {name.partition(".")[0] for name in MODULES}
@@ -91,6 +91,7 @@ class _Finder:
 
     def interfaces(self, name: str) -> ModuleSpec:
         """The module `my_pkg.msg`, `my_pkg.srv` or `my_pkg.action`. Raises ModuleNotFoundError."""
+        _check_exists(name)
         top, _, kind = name.partition(".")
         try:
             names = self.places.names(top)
@@ -173,6 +174,8 @@ class _Front(_Finder):
         known = self.places.names(top) if "." not in top else []
         if kinds := [kind for kind in KINDS if f"{kind}/{last}" in known]:
             return ImportError(f"{top} has no {last}; write: from {top}.{kinds[0]} import {last}", name=name)
+        if "." not in top and (near := closest(last, KINDS)):
+            return ImportError(f"{top} has no {last!r}; write {top}.{near}", name=name)
         try:
             generated.find(name.replace(".", "/"))
         except InterfaceError as error:
@@ -187,8 +190,7 @@ class _Back(_Finder):
         """The package `name` in the folders around the script: its Python modules, or its interfaces."""
         if not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name):
             return None
-        if name in HINTS:
-            raise ModuleNotFoundError(f"there is no {name!r} here; {HINTS[name]}; see {PAGE}", name=name)
+        _check_exists(name)
         try:
             folder = self.places.folder(name)
             if folder and (spec := _python_package(name, folder)):
@@ -228,6 +230,12 @@ def _is_ours(module: str) -> bool:
 def _is_file(spec: ModuleSpec | None) -> bool:
     """Whether a spec is of a file, and not only of a folder with that name."""
     return spec is not None and spec.origin is not None
+
+
+def _check_exists(name: str) -> None:
+    """Raises ModuleNotFoundError for a module that does not exist here, with what to use instead."""
+    if name in HINTS:
+        raise ModuleNotFoundError(f"there is no {name!r} here; {HINTS[name]}; see {PAGE}", name=name)
 
 
 def _missing_name(module: str, name: str, known: Sequence[str]) -> str:

@@ -140,6 +140,8 @@ class Section(NamedTuple):
 
     place: str
     values: dict[str, Value]
+    file: str = ""
+    """The file that it is from; empty for one of the command line."""
 
     def is_for(self, full_name: str) -> bool:
         """Whether it is for the node with that absolute name."""
@@ -171,7 +173,7 @@ def read(path: str) -> list[Section]:
         found = list(_sections(document(text), ""))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-    return sorted(found, key=lambda section: "*" not in section.place)
+    return sorted((each._replace(file=path) for each in found), key=lambda section: "*" not in section.place)
 
 
 def _sections(node: dict[str, Any], place: str) -> Iterator[Section]:

@@ -1,5 +1,7 @@
 """Tracebacks that show the user's code alone: what Python prints, without the frames of this package in between."""
 
+import contextlib
+import importlib
 import linecache
 import sys
 from pathlib import Path
@@ -10,7 +12,7 @@ from holozen.ros.ament_index_python import PackageNotFoundError
 from holozen.ros.catalog import MODULES, PAGE
 
 _OURS = str(Path(__file__).resolve().parents[1]) + "/"
-_MACHINERY = ("<frozen importlib", "<frozen runpy")
+_MACHINERY = ("<frozen importlib", "<frozen runpy", *(str(each.__file__) for each in (contextlib, importlib)))
 
 
 def show(error: BaseException) -> None:

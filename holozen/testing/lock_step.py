@@ -31,7 +31,7 @@ class LockStep:
 
         self.process = wire.start("sim", "--paused", *flags)
         # Another sim that is here already would answer in its place, and this one ends.
-        self.process.wait_for_line("listens on", PATIENCE)
+        self.process.wait_for_line(f"listens on {key_for('cmd_vel', robot)}", PATIENCE)
         self.bus = wire.bus("lock_step")
         self._times = self.bus.subscribe("simulation_status", SimulationStatus)
         self._odoms = self.bus.subscribe(key_for("odom", robot), Odometry)

@@ -297,5 +297,5 @@ def _check_call(key: object, request: object, reply: object, timeout: float) -> 
     _check_types(key, reply)
     if not isinstance(request, Message):
         raise TypeError(f"key {key!r}: the request {shorten(repr(request))} is not a message, such as TriggerRequest()")
-    if not timeout >= 0:
-        raise BusError(f"key {key!r}: timeout {timeout:g}: use 0 s or more")
+    if not (isinstance(timeout, int | float) and timeout >= 0):
+        raise BusError(f"key {key!r}: timeout {timeout!r}: use 0 s or more")

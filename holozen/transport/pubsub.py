@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 import threading
 import time
+import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from holozen.console import printable
 from holozen.messages import CodecError
 from holozen.transport.samples import Answers, Declared, RawSubscriber, Sample, until_closed
 from holozen.wire import is_command
@@ -270,7 +272,7 @@ class Latest(Generic[M]):
         self._lock = threading.Lock()  # Ctrl-C just after a Condition has taken its lock would leave it locked
         self._newer = threading.Condition(self._lock)
         self._arrivals: Arrivals[M] = Arrivals()
-        self.bad = 0  # samples that could not be decoded
+        self.error = ""  # why the newest sample that could not be decoded could not
         threading.Thread(target=self._keep, daemon=True).start()
 
     @property
@@ -279,9 +281,14 @@ class Latest(Generic[M]):
         return self._arrivals.count
 
     def read(self) -> tuple[M | None, float]:
-        """The newest message (None before the first) and its age in seconds since it arrived."""
+        """The newest message (None before the first) and its age in seconds since it arrived. Warns where nothing but
+        messages that cannot be decoded has arrived.
+        """
         with self._lock:
-            return self._arrivals.newest, self._arrivals.age(time.monotonic())
+            newest, age = self._arrivals.newest, self._arrivals.age(time.monotonic())
+        if newest is None and self.error:
+            warnings.warn(self.error, stacklevel=2)
+        return newest, age
 
     def patience(self, silence: float) -> float:
         """The age from which the newest is stale, see Arrivals."""
@@ -301,7 +308,7 @@ class Latest(Generic[M]):
         for received in until_closed(self._subscription.recv):
             with self._lock:
                 if received.message is None:
-                    self.bad += 1
+                    self.error = printable(f"{received.key}: {received.error}")
                     continue
                 self._arrivals.record(received.message, time.monotonic())
                 self._newer.notify_all()

@@ -249,6 +249,12 @@ def test_the_command_line_pauses_plays_steps_and_resets(
     assert get_state(sim) == State.STATE_PLAYING
 
 
+def test_a_robot_that_is_not_in_the_sim_is_named(lock_step: Sim, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("holozen.testing.lock_step.PATIENCE", 1.0)
+    with pytest.raises(AssertionError, match="'listens on Fred/cmd_vel' from "):
+        lock_step(robot="Fred")
+
+
 def test_steps_end_with_ctrl_c_and_with_their_timeout(lock_step: Sim, wire: Wire) -> None:
     sim = lock_step()
     interrupted = wire.start("sim", "step", "10000000")

@@ -285,6 +285,19 @@ def test_what_was_fresh_before_a_suspension_moves_no_base_after_it(
     assert base.velocity() == STOP
 
 
+def test_what_is_no_limit_and_no_name_is_refused(wire: Wire, tmp_path: Path) -> None:
+    bus = wire.bus("base", lasting=True)
+    wrongs: list[tuple[dict[str, Any], str]] = [
+        ({"max_linear": -0.3}, "^max_linear is -0.3 m/s; use 0 or more"),
+        ({"max_angular": float("nan")}, "^max_angular is nan rad/s; use 0 or more"),
+        ({"robot": "Fred Bob"}, "^robot name 'Fred Bob': use a letter"),
+    ]
+    for wrong, expected in wrongs:
+        with pytest.raises(ValueError, match=expected):
+            Base(bus, **wrong)
+    assert Base(bus, state=str(tmp_path)).velocity() == STOP
+
+
 WHEELS = """
 import math
 

@@ -36,7 +36,7 @@ def setter(bus: Bus, name: str) -> str:
     def missing() -> str:  # tells a sim that does not answer from one that has lost its reader
         ends = [(end.kind, end.node) for end in bus.endpoints() if end.key == key]
         answers = [getattr(answer, "payload", answer) for answer in bus.ask_all(key, 5.0)]
-        seen = f"connected: {bus.connected()}, the graph has {ends}, {statuses.bad} were bad"
+        seen = f"connected: {bus.connected()}, the graph has {ends}, bad: {statuses.error!r}"
         return f"a status of {name}; {seen}, and a get is answered {answers}"
 
     wait_for(lambda: statuses.count, what=missing)

@@ -67,7 +67,7 @@ INSTEAD = {
     "turtlesim/turtle_teleop_key": Instead("holozen teleop"),
     "xacro/*": Instead("holozen xacro", arguments=None),
     "foxglove_bridge/*": Instead("holozen view --foxglove"),
-    "gazebo_ros/spawn_entity*": Instead("holozen spawn"),
+    "gazebo_ros/spawn_*": Instead("holozen spawn", arguments=None),
     "ros_gz_sim/create": Instead("holozen spawn"),
     "ros_ign_gazebo/create": Instead("holozen spawn"),
     "gazebo_ros/gz*": Instead("holozen sim --empty"),

@@ -1,7 +1,7 @@
 """ROS arguments of a command line: `--ros-args -r from:=to -p name:=value --params-file FILE --log-level LEVEL --`."""
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from holozen.console import printable
@@ -10,7 +10,7 @@ from holozen.ros.parameter_yaml import Section, Value
 from holozen.ros.rclpy import names
 from holozen.ros.rclpy.exceptions import NameValidationException, RCLInvalidROSArgsError, UnknownROSArgsError
 from holozen.ros.rclpy.logging import LoggingSeverity, get_logging_severity_from_string
-from holozen.suggest import article, suggest
+from holozen.suggest import article, listed, suggest
 
 START, END = "--ros-args", "--"
 REMAP, PARAM, FILE, LEVEL = "--remap", "--param", "--params-file", "--log-level"
@@ -56,6 +56,15 @@ class Arguments:
             if section.is_for(full_name):
                 found |= section.values
         return found
+
+    def unused(self, names: Collection[str], declared: Collection[str]) -> Iterator[str]:
+        """A line for each parameter that none of the nodes `names` declares, and each file that has none for them."""
+        mine = [section for section in self.sections if any(map(section.is_for, names))]
+        for name in sorted({name for section in mine if not section.file for name in section.values} - {*declared}):
+            yield f"parameter {name!r} is given, but not declared{suggest(name, declared)}"
+        for file in sorted({section.file for section in self.sections} - {section.file for section in mine} - {""}):
+            places = listed(section.place for section in self.sections if section.file == file)
+            yield f"{file} has no parameters for {listed(names)}; it has some for {places}"
 
     def merged(self, first: "Arguments") -> "Arguments":
         """These, with those of one node taking precedence."""

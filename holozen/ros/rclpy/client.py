@@ -5,6 +5,7 @@ import math
 import threading
 import time
 import weakref
+from collections.abc import Callable
 from typing import Any
 
 from holozen.messages.codec import CodecError
@@ -15,8 +16,9 @@ from holozen.ros.rclpy.handle import NodeHandle, Owned, wrong_type
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import QoSProfile
 from holozen.ros.rclpy.task import Future, TaskQueue
-from holozen.ros.rclpy.waitable import Waker, deadline
+from holozen.ros.rclpy.waitable import LATE, Waker, deadline
 from holozen.transport.errors import BusError, NoReply, ServiceError
+from holozen.transport.graph import on_key
 
 __all__ = ["Client"]
 
@@ -77,7 +79,8 @@ class Client(Owned):
 
         Raises TimeoutError, ServiceError with the service's reason, or InvalidHandle if it is destroyed while it waits.
         """
-        return wait_for_reply(self.call_async(request), self._handle.context, self.srv_name, timeout_sec)
+        future = self.call_async(request)
+        return wait_for_reply(future, self._handle.context, self.srv_name, timeout_sec, self._warn_of_own_service)
 
     def call_async(self, request: Any) -> Future:
         """Call the service. Returns the future of the reply, at once."""
@@ -110,6 +113,15 @@ class Client(Owned):
         """Those that wait for replies, which end with the bus."""
         return list(self._threads)
 
+    def _warn_of_own_service(self) -> None:
+        """For a call that takes long: a node that waits in its only thread does not answer."""
+        ends = on_key(self._handle.bus.endpoints(), key(self.srv_name), "srv")
+        if any(end.session == self._handle.bus.id for end in ends):
+            self._handle.logger.warning(
+                f"no reply yet from {self.srv_name}, which this node serves itself: does it spin, in a"
+                " MultiThreadedExecutor, with a ReentrantCallbackGroup? call_async and add_done_callback need neither"
+            )
+
     def _check_open(self) -> None:
         if self._is_closed:
             raise InvalidHandle(f"the client of {self.srv_name} was destroyed")
@@ -136,13 +148,19 @@ class Client(Owned):
         return None
 
 
-def wait_for_reply(future: Future, context: Context, name: str, timeout_sec: float | None = None) -> Any:
-    """The result of a future of the service or action `name`, once it is there.
+def wait_for_reply(
+    future: Future,
+    context: Context,
+    name: str,
+    timeout_sec: float | None = None,
+    when_late: Callable[[], None] = lambda: None,
+) -> Any:
+    """The result of a future of the service or action `name`, once it is there. `when_late` is called after LATE.
 
     Raises its exception, TimeoutError, InvalidHandle if it is cancelled, and what `Publisher.publish` raises after a
     shutdown.
     """
-    waker, end = Waker(), deadline(timeout_sec)
+    waker, end, late = Waker(), deadline(timeout_sec), deadline(LATE)
     future.watch(waker.wake)
     while not future.done():
         left = min(LOOK, end - time.monotonic())
@@ -151,6 +169,9 @@ def wait_for_reply(future: Future, context: Context, name: str, timeout_sec: flo
             raise TimeoutError(f"no reply from {name} within {timeout_sec:g} s")
         context.check_can_publish(f"call {name}")
         waker.wait(left)
+        if time.monotonic() > late and not future.done():
+            late = math.inf
+            when_late()
     if future.cancelled():
         raise InvalidHandle(f"the client of {name} was destroyed while it waited for the reply")
     return future.result()

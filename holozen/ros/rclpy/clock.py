@@ -10,6 +10,7 @@ from typing import Any, Self
 from weakref import WeakSet
 
 from holozen.messages import Clock as ClockMessage
+from holozen.ros import tracebacks
 from holozen.ros.catalog import HelpfulAttributes
 from holozen.ros.rclpy import names
 from holozen.ros.rclpy.context import get_default_context
@@ -364,5 +365,6 @@ class TimeSource:
             try:
                 for clock in list(self._clocks):
                     clock.set_ros_time_override(self._shown)
-            except Exception:  # from a jump callback; time must go on
+            except Exception as error:  # from a jump callback; time must go on
+                tracebacks.clean(error)
                 self._node.get_logger().error(f"a jump callback of the clock failed:\n{traceback.format_exc()}")

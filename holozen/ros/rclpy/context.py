@@ -154,6 +154,11 @@ class Context:
         with self._lock:
             self._open = [one for one in self._open if one is not something]
 
+    def all_open(self) -> list[Closable]:
+        """What it would close at the end."""
+        with self._lock:
+            return list(self._open)
+
     def check_can_publish(self, action: str = "publish") -> None:
         """Raises ExternalShutdownException once the grace period after a signal is over, RCLError after `shutdown`."""
         if self._running or (self._interrupted and time.monotonic() - self._interrupted <= GRACE):

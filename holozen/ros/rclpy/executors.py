@@ -1,6 +1,7 @@
 """Executors, which run the callbacks of nodes: in the spinning thread, or in several."""
 
 import inspect
+import math
 import os
 import threading
 import time
@@ -14,9 +15,10 @@ from holozen.ros.catalog import HelpfulAttributes
 from holozen.ros.rclpy.callback_groups import CallbackGroup
 from holozen.ros.rclpy.context import Context, ExternalShutdownException, get_default_context
 from holozen.ros.rclpy.exceptions import RCLError
+from holozen.ros.rclpy.logging import get_logger
 from holozen.ros.rclpy.task import Future, Task, TaskQueue
 from holozen.ros.rclpy.timer import Timer
-from holozen.ros.rclpy.waitable import Waitable, Waker, Work, deadline
+from holozen.ros.rclpy.waitable import LATE, Waitable, Waker, Work, deadline
 from holozen.suggest import shorten
 
 __all__ = [
@@ -56,6 +58,7 @@ class Executor(HelpfulAttributes):
         self._waitables: tuple[Waitable, ...] | None = None  # of all nodes; None after a change
         self._timers: list[Timer] = []
         self._turn = 0  # the index of the next waitable to look at
+        self._began = math.inf  # when the callback began that now runs in the spinning thread, and may spin itself
         self._is_shutdown = False
         self._context.on_shutdown(self.wake)
 
@@ -211,6 +214,7 @@ class Executor(HelpfulAttributes):
 
     def _block(self, seconds: float) -> Work | None:
         """Wait until there may be work; the work if it arrived at the last moment."""
+        self._warn_of_spin_in_callback()
         self.waker.waiting = True
         try:
             for waitable in self._all():
@@ -219,10 +223,23 @@ class Executor(HelpfulAttributes):
                 return found
             # From here on a shutdown, or a future that is done, wakes this wait even before it begins.
             waits = [seconds, *(timer.wait_seconds() for timer in self._timers)]
+            if self._began < math.inf:
+                waits.append(LATE)
             self.waker.wait(min(wait for wait in waits if wait is not None))
         finally:
             self.waker.waiting = False
         return None
+
+    def _warn_of_spin_in_callback(self) -> None:
+        """Once a callback has spun for long: what it waits for may be a callback of its own group."""
+        if time.monotonic() - self._began > LATE:
+            self._began = math.inf
+            groups = [each.callback_group for each in self._all() if each.callback_group is not None]
+            if not all(group.can_execute(None) for group in groups):
+                get_logger("rclpy").warning(
+                    "a callback spins its node: other callbacks of its group wait until it has ended; use a"
+                    " ReentrantCallbackGroup, or add_done_callback of the future"
+                )
 
     def _all(self) -> tuple[Waitable, ...]:
         waitables = self._waitables
@@ -255,7 +272,11 @@ class SingleThreadedExecutor(Executor):
     """Runs callbacks in the spinning thread, one after the other."""
 
     def _execute(self, waitable: Waitable, work: Callable[[], Any]) -> None:
-        self._run(waitable, work)
+        outer, self._began = self._began, time.monotonic()
+        try:
+            self._run(waitable, work)
+        finally:
+            self._began = outer
 
 
 class MultiThreadedExecutor(Executor):

@@ -93,6 +93,7 @@ class _State(NodeHandle):
         self._has_left = False
         self._calls: list[threading.Thread] = []
         self._lookout: Lookout | None = None
+        self._has_reported = False
         context.opened(self)
 
     def all(self, kind: type[T]) -> list[T]:
@@ -112,6 +113,16 @@ class _State(NodeHandle):
         if self.executor is not None:
             self.executor.changed()
         return made
+
+    def report_unused(self) -> None:
+        """Warn, once, of parameters from outside that no node of this process declares."""
+        if self._has_reported or not self.arguments.sections or self.store.allow_undeclared:
+            return
+        self._has_reported = True
+        nodes = [one for one in self.context.all_open() if isinstance(one, _State) and hasattr(one, "store")]
+        declared = {name for node in nodes for name in node.store.values}
+        for line in self.arguments.unused({node.full_name for node in nodes}, declared):
+            self.logger.warning(line)
 
     def disown(self, made: Any) -> bool:
         """Destroy something. Returns whether it belonged to this node."""
@@ -249,6 +260,7 @@ class Node(HelpfulAttributes):
             before.remove_node(self)
         if value is not None:
             value.add_node(self)
+            self._holozen.report_unused()
 
     publishers = _owned(Publisher, "Its publishers.")
     subscriptions = _owned(Subscription, "Its subscriptions.")

@@ -23,6 +23,7 @@ __all__ = ["GuardCondition"]
 
 T = TypeVar("T")
 
+LATE = 2.0  # s that a callback may wait for another one before that is reported
 LONGEST = 3600.0  # s of one wait; a lock accepts no much larger number
 
 

@@ -188,6 +188,13 @@ def test_a_goal_ends_as_its_server_says(town: Wire, scripts: Path) -> None:
         assert [line for line in found if not line.startswith("feedback")][-len(lines) :] == lines
 
 
+def test_what_the_callback_of_a_goal_raises_is_shown_without_frames_of_ours(wire: Wire, scripts: Path) -> None:
+    server = serve(wire, scripts)
+    assert printed(client(wire, scripts, "-1"))[-1] == "result 6 []"
+    shown = server.err.partition("Traceback")[2]
+    assert shown.count("  File ") == 1 and shown.endswith("ValueError: negative order\n")
+
+
 def test_a_goal_is_cancelled(town: Wire, scripts: Path) -> None:
     *_, last = printed(client(town, scripts, "9999", "cancel"))
     assert last.startswith("result 5 [0, 1, 1")

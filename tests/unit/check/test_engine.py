@@ -81,6 +81,16 @@ def test_properties_and_macros_that_nothing_uses(findings: Findings) -> None:
     assert message == ["macro 'part' is not used", "property 'size' is not used"]
 
 
+def test_a_call_of_a_macro_without_the_prefix_is_told_to_write_it(findings: Findings) -> None:
+    found = findings(
+        HEAD
+        + WHEELS
+        + USE.replace('xacro:part name="b"', 'part name="b"').replace('0 0 2"/></xacro:part', '0 0 2"/></part'),
+        "r.xacro",
+    )
+    assert [finding.fix for finding in found if finding.rule == "ignored"] == ["write <xacro:part> to call the macro"]
+
+
 def test_an_argument_that_nothing_asks_for_is_a_finding(findings: Findings, good: str) -> None:
     found = findings(good, args={"size": "1"})
     assert [(finding.rule, finding.place.line) for finding in found] == [("load-note", 0)]

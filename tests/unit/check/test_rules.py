@@ -68,6 +68,7 @@ BROKEN = [
     ("floating", '<link name="base">', '<link name="base"><gravity>false</gravity>', "link 'base'"),
     ("wheel-load", BODY, BODY.replace("0.02", "0"), "'base' is as low as the wheels"),
     ("wheel-side", "<leftJoint>left_joint</leftJoint><rightJoint>right_joint<", SWAPPED, "'left_joint' (a right joint"),
+    ("wheel-forward", LEFT, LEFT.replace("0 1 0", "0 -1 0"), "'left_joint' turns about (0 -1 0); forward is"),
     ("wheel-measure", "<wheelSeparation>0.24", "<wheelSeparation>0.3", "is 0.3 m, and the wheels are 0.24 m apart"),
     ("wheel-measure", "<wheelDiameter>0.1<", "<wheelDiameter>0.05<", "is 0.05 m, and that of 'left_wheel' is 0.1 m"),
     ("tree", "</robot>", '<link name="lost"/></robot>', "'lost' has no parent joint"),

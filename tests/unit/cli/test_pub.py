@@ -99,7 +99,7 @@ def test_what_is_no_message_is_refused_with_the_reason() -> None:
         ("{twist: {linaer: {}}}", "geometry_msgs/msg/Twist has no field 'twist.linaer' (did you mean 'linear'?)"),
         ("[]", "geometry_msgs/msg/Twist: [] is not a mapping of fields"),
         ("", "geometry_msgs/msg/Twist: None is not a mapping of fields"),
-        ("-1", "geometry_msgs/msg/Twist: -1 is not a mapping of fields"),
+        ("-1", "geometry_msgs/msg/Twist: -1 is not a mapping of fields; write {linear: ..., angular: ...}"),
         ('{"linear":{"x":NaN}}', "linear.x is not a finite number"),
         ('{"linear":{"x":1e999}}', "linear.x is not a finite number"),
         ("{angular: {z: -.inf}}", "angular.z is not a finite number"),

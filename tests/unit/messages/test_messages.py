@@ -1,6 +1,8 @@
 """Messages have the names, fields and defaults of ROS, and refuse what they do not have."""
 
 import math
+import subprocess
+import sys
 
 import msgspec
 import pytest
@@ -28,6 +30,12 @@ def test_a_message_of_nothing_is_finite_and_zero_but_for_the_unit_rotation() -> 
         assert set(map(str, numbers(msgspec.to_builtins(empty)))) <= {"0", "0.0", "", "False"}, kind
         assert msgspec.json.decode(b"{}", type=kind) == empty, kind
         assert not_finite(empty) == "", kind
+
+
+def test_all_are_there_for_a_script_that_imports_everything() -> None:
+    script = "from holozen.messages import *; print(Twist.__name__, TriggerReply.__name__, 'Struct' in globals())"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60)
+    assert done.stdout == "Twist TriggerReply False\n", done.stderr
 
 
 def test_the_default_rotation_is_none() -> None:

@@ -116,7 +116,10 @@ def test_a_value_that_does_not_fit_is_reported_with_its_field() -> None:
         ),
         (m.JointState(name=[3]), "JointState: name[0]: 3 is not a valid string"),  # type: ignore[list-item]
         (s.Result(result=256), "Result: result: 256 is not a valid uint8"),
-        (m.Twist(linear=None), "Twist: linear: None is not a mapping of fields"),  # type: ignore[arg-type]
+        (
+            m.Twist(linear=None),  # type: ignore[arg-type]
+            "Twist: linear: None is not a mapping of fields; write {x: ..., y: ..., z: ...}",
+        ),
     ]:
         with pytest.raises(CodecError) as error:
             encode(message, "cdr")

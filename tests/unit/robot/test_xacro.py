@@ -224,6 +224,15 @@ def test_a_misspelt_name_is_reported_with_one_that_looks_alike(folder: Path) -> 
             "unknown macro name: xacro:wheell (did you mean 'wheel'?)",
         ),
         ('<xacro:property name="width" value="1"/><l n="${widht}"/>', "'widht' (did you mean 'width'?)"),
+        ('<l n="${r}"/>', "name 'r' is not defined when evaluating expression 'r'"),
+        (
+            '<l n="${r}"/>\n<xacro:property name="r" value="1"/>',
+            "'r'; it is defined further down, in line 3: move that up",
+        ),
+        (
+            '<xacro:m/>\n<xacro:macro name="m"><a/></xacro:macro>',
+            "xacro:m; it is defined further down, in line 3: move that up",
+        ),
         ('<xacro:property name="r" value="0,05"/><l n="${r/2}"/>', "r is the text '0,05', not a number; write 0.05"),
         ('<xacro:arg name="side" default="1"/><l n="$(arg sied)"/>', "default in <xacro:arg> (did you mean 'side'?)"),
         (

@@ -67,6 +67,17 @@ def test_a_call_in_a_callback_of_the_same_node_is_answered(ros: Wire, spin_for: 
     assert got[0] == "done"
 
 
+def test_a_call_that_waits_for_the_node_itself_says_so(
+    ros: Wire, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("holozen.ros.rclpy.client.LATE", 0.01)
+    node = rclpy.create_node("tom")
+    node.create_service(Trigger, "go", lambda _request, response: response)  # and it does not spin
+    with pytest.raises(TimeoutError):
+        node.create_client(Trigger, "go").call(Trigger.Request(), timeout_sec=0.5)
+    assert capsys.readouterr().err.count("no reply yet from /go, which this node serves itself: does it spin") == 1
+
+
 def test_a_synchronous_call_gives_up_in_time(ros: Wire) -> None:
     client = rclpy.create_node("tom").create_client(Trigger, "go")
     with pytest.raises(TimeoutError, match=r"^no reply from /go within 0\.05 s$"):

@@ -158,6 +158,23 @@ def test_a_spin_within_a_callback_leaves_the_outer_one_its_node(ros: Wire, spin_
     spin_for(lambda: "inner" in got and got[-1] == "outer", node)
 
 
+@pytest.mark.parametrize(("group", "lines"), [(MutuallyExclusiveCallbackGroup, 1), (ReentrantCallbackGroup, 0)])
+def test_a_spin_within_a_callback_that_no_other_callback_can_end_says_so(
+    ros: Wire, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], group: Any, lines: int
+) -> None:
+    monkeypatch.setattr("holozen.ros.rclpy.executors.LATE", 0.01)
+    node = rclpy.create_node("tom")
+    once = node.create_timer(0.001, lambda: spin(), callback_group=group())
+
+    def spin() -> None:
+        once.cancel()
+        for _ in range(2):
+            rclpy.spin_until_future_complete(node, rclpy.Future(), timeout_sec=0.1)
+
+    rclpy.spin_once(node)
+    assert capsys.readouterr().err.count("a callback spins its node: other callbacks of its group wait") == lines
+
+
 def test_data_that_arrive_while_things_are_made_and_destroyed_do_no_harm(ros: Wire, spin_for: Spin) -> None:
     node, got, made = rclpy.create_node("tom"), list[Any](), list[Any]()
     writer = rclpy.create_node("writer").create_publisher(Twist, "a", 10)

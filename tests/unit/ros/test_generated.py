@@ -400,6 +400,11 @@ def test_our_own_message_is_the_same_bytes() -> None:
         ours = m.JointState(name=["a"], position=[0.1, 2.0], effort=[1e300])
         theirs: Any = generated.find(ours.ROS)(name=["a"], position=[0.1, 2.0], effort=np.array([1e300]))
         assert encode(theirs, wire) == encode(ours, wire)
+        numpys: dict[str, Any] = {"position": np.array([0.1, 2.0]), "effort": [np.float64(1e300)]}
+        assert encode(m.JointState(name=["a"], **numpys), wire) == encode(ours, wire)
+        numpys["velocity"] = [np.float32("nan")]
+        with pytest.raises(CodecError, match=r"^JointState.velocity\[0\] is not a finite number$"):
+            encode(m.JointState(**numpys), wire)
         read = decode(encode(ours, wire), encoding(wire, m.JointState), (m.JointState,))
         assert type(read.position) is list
 

@@ -264,6 +264,7 @@ def test_a_module_of_ros_has_what_ours_exports(pretend: ModuleType) -> None:
 
 def test_an_import_of_a_type_from_its_package_is_answered_with_its_module() -> None:
     importer.install()
+    assert refused("from geometry_msgs.msgs import Twist") == "geometry_msgs has no 'msgs'; write geometry_msgs.msg"
     expected = "geometry_msgs has no Twist; write: from geometry_msgs.msg import Twist"
     assert refused("from geometry_msgs import Twist", ImportError) == expected
 

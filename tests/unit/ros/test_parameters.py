@@ -2,10 +2,12 @@
 
 import threading
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from holozen.ros import rclpy
 from holozen.ros.generated import find
 from holozen.ros.rclpy import exceptions as e
 from holozen.ros.rclpy.node import Node
@@ -55,6 +57,25 @@ def test_values_of_the_script_go_before_those_of_the_command_line() -> None:
     assert node.declare_parameter("speed", 1.0).value == 0.7
     with pytest.raises(TypeError, match="list of rclpy"):
         Tom(overrides=[0.7])  # type: ignore[list-item]
+
+
+def test_one_that_is_given_and_that_no_node_declares_is_reported_once(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    ours, others = (tmp_path / name for name in ("ours.yaml", "others.yaml"))
+    ours.write_text("/lab/tom: {ros__parameters: {sped: 1.0}}\n/ann: {ros__parameters: {speed: 1.0}}")
+    others.write_text("tom: {ros__parameters: {speed: 1.0}}")
+    files = ("--params-file", str(ours), "--params-file", str(others))
+    node, other = Tom("-p", "sped:=0.5", "-p", "size:=9", *files), Tom()
+    node.declare_parameter("speed", 1.0)
+    other.declare_parameter("size", 3)
+    for _ in range(2):
+        rclpy.spin_once(node, timeout_sec=0)
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.partition("]: ")[2] for line in lines] == [
+        "parameter 'sped' is given, but not declared (did you mean 'speed'?)",
+        f"{others} has no parameters for /lab/tom; it has some for /tom",
+    ]
 
 
 def test_many_are_declared_with_a_prefix() -> None:

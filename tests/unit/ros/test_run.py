@@ -60,7 +60,7 @@ def test_it_has_what_python_gives_every_script(run: Run, write: Write) -> None:
         ("teleop_twist_keyboard teleop_twist_keyboard", "use `holozen teleop`"),
         ("rviz2 rviz2 -d a.rviz", "use `holozen view` or `holozen map`"),
         ("rviz2", "rviz2 is not run here: use `holozen view` or `holozen map`"),
-        ("gazebo_ros spawn_entity.py -entity Fred", "use `holozen spawn`"),
+        ("gazebo_ros spawn_model -urdf -model Fred -file a.urdf", "use `holozen spawn -urdf -model Fred -file a.urdf`"),
         ("gazebo_ros gzserver", "use `holozen sim --empty`"),
         ("gazebo_ros gzclient", "use `holozen view` or `holozen map`"),
         ("tf2_tools view_frames", "tf2_tools view_frames is not run here: use `holozen view` or `holozen tf echo`"),
@@ -156,6 +156,15 @@ rclpy.spin(node)
     assert "holozen" not in done.stderr
     assert done.stderr.splitlines()[-1] == "KeyError: 'lost'"
     assert done.stderr.count("  File ") == 2
+
+
+def test_frames_of_pythons_own_import_and_contexts_are_left_out(run: Run, write: Write, my_bot: Path) -> None:
+    write("src/my_bot/setup.py", "setup(entry_points={'console_scripts': ['b = my_bot.b:main']})")
+    write("src/my_bot/my_bot/__init__.py")
+    write("src/my_bot/my_bot/b.py", "import rclpy\nrclpy.init()\nrclpy.spin(rclpy.node.Node)")
+    done = run("my_bot", "b")
+    assert done.stderr.endswith("TypeError: pass a node, such as Node(), not the class\n")
+    assert done.stderr.count("  File ") == 1
 
 
 def test_a_name_that_is_not_there_is_reported_in_the_users_traceback(run: Run, write: Write) -> None:

@@ -207,6 +207,7 @@ def test_wrong_arguments_are_named_with_what_is_allowed(wire: Wire) -> None:
         (BusError, lambda: wire.bus(wire="yaml"), "'yaml'; there are json, "),
         (BusError, lambda: ask(TriggerRequest(), TriggerReply, -1), "timeout -1: use 0 s or more"),
         (BusError, lambda: ask(TriggerRequest(), TriggerReply, float("nan")), "timeout nan: use 0 s or more"),
+        (BusError, lambda: ask(TriggerRequest(), TriggerReply, "1"), "timeout '1': use 0 s or more"),
         (TypeError, lambda: bus.publisher("odom", dict), "'odom': dict is not the class of a message"),
         (TypeError, lambda: bus.publisher("odom", TriggerReply()), "'odom': TriggerReply(.*) is not the class of"),
         (TypeError, lambda: bus.publisher(5, Twist), "key '5': give a text"),

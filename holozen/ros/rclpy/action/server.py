@@ -7,6 +7,7 @@ from functools import partial
 from inspect import isawaitable
 from typing import Any
 
+from holozen.ros import tracebacks
 from holozen.ros.catalog import HelpfulAttributes
 from holozen.ros.rclpy.callback_groups import CallbackGroup
 from holozen.ros.rclpy.handle import wrong_type
@@ -267,8 +268,10 @@ class ActionServer(HelpfulAttributes):
                 wanted, given = article(f"{self.action_type.__name__}.Result"), article(type(result).__name__)
                 raise TypeError(f"the callback must return {wanted}, and gave {given}{hint}")
         except Exception as error:
-            self._node.get_logger().error(f"{self.action_name}: a goal is aborted: {type(error).__name__}: {error}")
-            traceback.print_exc()
+            end = "is aborted" if handle.is_active else "has failed"
+            self._node.get_logger().error(f"{self.action_name}: a goal {end}: {type(error).__name__}: {error}")
+            tracebacks.clean(error)
+            traceback.print_exception(error)
             result = self.action_type.Result()
             if handle.is_active:
                 handle.abort()
