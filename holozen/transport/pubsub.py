@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import threading
 import time
-import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -272,7 +271,7 @@ class Latest(Generic[M]):
         self._lock = threading.Lock()  # Ctrl-C just after a Condition has taken its lock would leave it locked
         self._newer = threading.Condition(self._lock)
         self._arrivals: Arrivals[M] = Arrivals()
-        self.error = ""  # why the newest sample that could not be decoded could not
+        self.error = ""  # why the newest of the samples that cannot be decoded cannot
         threading.Thread(target=self._keep, daemon=True).start()
 
     @property
@@ -281,14 +280,9 @@ class Latest(Generic[M]):
         return self._arrivals.count
 
     def read(self) -> tuple[M | None, float]:
-        """The newest message (None before the first) and its age in seconds since it arrived. Warns where nothing but
-        messages that cannot be decoded has arrived.
-        """
+        """The newest message (None before the first; `error` may say why) and its age in seconds since it arrived."""
         with self._lock:
-            newest, age = self._arrivals.newest, self._arrivals.age(time.monotonic())
-        if newest is None and self.error:
-            warnings.warn(self.error, stacklevel=2)
-        return newest, age
+            return self._arrivals.newest, self._arrivals.age(time.monotonic())
 
     def patience(self, silence: float) -> float:
         """The age from which the newest is stale, see Arrivals."""
