@@ -94,10 +94,9 @@ class Backlog:
     def look(self, now: float, is_silent: bool) -> str:
         """Why a goal that arrives at `now` (s) is refused; empty if it cannot be old. `is_silent`: no odom comes."""
         before, self._looked = self._looked, now
-        if now - before > SUSPENDED:
-            self._until, self._why = now + CATCHING_UP, LATE
-        elif is_silent:  # the next look may be as far away as two attempts to reach a service
-            self._until, self._why = now + CATCHING_UP + 2 * PATIENCE, HELD_UP
+        if now - before > SUSPENDED or is_silent:
+            self._why = LATE if now - before > SUSPENDED else HELD_UP
+            self._until = now + CATCHING_UP + 2 * PATIENCE  # the next look may be two attempts to reach a service away
         return self._why if now < self._until else ""
 
 
@@ -182,6 +181,10 @@ class Follower:
                 self._report(f"goal_pose: ({x:.2f}, {y:.2f}) by {received.source or 'an unknown sender'}")
                 self._set_out(Journey("goal_pose", [(x, y, theta)]), "a newer goal came on goal_pose")
         if journey := self._actions.take():
+            if late:
+                self._report(f"{journey.origin}: refused: {late}")
+                journey.give_up(late)
+                return self._wanted
             self._set_out(journey, "a newer goal came")
             journey.begin()
         return self._wanted
