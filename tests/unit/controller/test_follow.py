@@ -381,6 +381,27 @@ def test_a_goal_is_aborted_after_the_controller_was_suspended(case: Case, monkey
     wait_for(lambda: case.robot.heard[-1] == Twist(), what="the robot to be stopped")
 
 
+def test_after_a_suspension_it_speeds_up_from_rest(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    offset = itertools.count()
+
+    def suspend(robot: Robot) -> None:
+        """A second has passed when the next odom comes."""
+        robot.time, passed = robot.time + 1.0, next(offset) + 1.0
+        clock = SimpleNamespace(monotonic=lambda: time.monotonic() + passed)
+        monkeypatch.setattr("services.controller.follow.time", clock)
+
+    case.lap()
+    send(case, 1e4, 0.0)
+    wait_for(lambda: case.robot.heard and case.robot.heard[-1].linear.x == pytest.approx(2.0))
+    case.robot.heard.clear()
+
+    def slows_down() -> bool:
+        case.robot.resets.append(suspend)
+        return any(0 < command.linear.x < 1.1 for command in case.robot.heard)
+
+    wait_for(slows_down, what="a command at which the robot speeds up from rest")
+
+
 def test_a_goal_that_waited_for_a_suspended_controller_is_refused(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     clock = itertools.count(time.monotonic(), 3.0)  # it is suspended between any two looks
     monkeypatch.setattr("services.controller.follow.time", SimpleNamespace(monotonic=lambda: next(clock)))
@@ -400,6 +421,7 @@ def test_a_goal_is_refused_at_the_first_look_at_which_it_can_be_there(began: flo
     assert not backlog.look(0.0, False)
     looks = [(began, is_silent), (began + 1.0, False), (began + 2.0, False)]  # a second apart without a list of goals
     assert [backlog.look(now, silent) for now, silent in looks] == [why, why, ""]
+    assert [backlog.look(now, True) for now in (9.0, 9.1)] == [LATE, LATE], "odom comes a moment later"
 
 
 def test_a_goal_that_a_link_may_have_held_up_is_refused(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
