@@ -22,7 +22,8 @@ MAX_SPEED, MAX_TURN = 100.0, 1000.0  # m/s, rad/s; a command beyond them is a mi
 MAX_FORCE = 1e4  # N, N m; likewise
 MAX_OF_JOINT = {"position": 1e4, "velocity": 1e3, "effort": 1e6}  # rad or m; rad/s or m/s; N m or N; likewise
 
-FREEING = ("release", "resume")  # the services after which a robot may move; no late call ends a stop from after it
+# The services after which a robot may move: no late call ends a stop from after it, or sends off a robot.
+FREEING = ("release", "resume", "send_goal")
 VELOCITIES = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
 """The types of commands of a velocity."""
 

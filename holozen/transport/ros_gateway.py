@@ -58,7 +58,7 @@ UNKNOWN_AGE = (
 )
 LATE = (
     f"it was sent more than {wire.COMMAND_SILENCE:g} s from this machine's clock: it is late, and has to be sent again,"
-    " or the clocks differ: set them, or use `holozen release` or `holozen controller --resume`"
+    " or the clocks differ: set them, or use `holozen release`, `controller --resume` or `action send_goal`"
 )
 FAILED = 4  # OPERATION_FAILED of simulation_interfaces/msg/Result
 SHARED = ("tf", "tf_static")  # topics with several publishers by nature
@@ -445,6 +445,8 @@ class Gateway:
             if fields is None:
                 self._report(f"/{found.topic}: a caller waits, as {found.type} has no place for an error: {error}")
                 raise
+            if "accepted" in fields:  # there is no place for the reason
+                self._report(f"/{found.topic}: {error}")
             payload = cdr.write(interface.response, fields)
         query.reply(self._form.key(found), payload, encoding="application/cdr", attachment=attachment)
 
@@ -507,6 +509,8 @@ def _refused(response: Interface, error: ServiceError) -> dict[str, Any] | None:
     kinds = {field.name: field.nested.name if field.nested else field.type for field in response.fields}
     if kinds.keys() >= {"success", "message"}:
         return {"success": False, "message": str(error)}
+    if "accepted" in kinds:  # a goal is rejected
+        return {"accepted": False}
     if kinds.get("result") == "simulation_interfaces/msg/Result":
         return {"result": error.fields.get("result") or {"result": FAILED, "error_message": str(error)}}
     return None

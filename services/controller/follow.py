@@ -14,7 +14,7 @@ from holozen.suggest import listed, suggest
 from holozen.transport.errors import NoReply, ServiceError
 from holozen.transport.graph import Endpoint
 from holozen.transport.pubsub import Publisher
-from holozen.wire import PRIORITY_OF, key_for, resume_command
+from holozen.wire import COMMAND_SILENCE, PRIORITY_OF, key_for, resume_command
 
 from .goto import Gains, Leg, Pose, arrived, error, velocity
 from .journeys import GoalServers, Journey
@@ -94,10 +94,11 @@ class Backlog:
     def look(self, now: float, is_silent: bool) -> str:
         """Why a goal that arrives at `now` (s) is refused; empty if it cannot be old. `is_silent`: no odom comes."""
         before, self._looked = self._looked, now
-        if now - before > SUSPENDED:
-            self._until, self._why = now + CATCHING_UP, LATE
-        elif is_silent:  # the next look may be as far away as two attempts to reach a service
-            self._until, self._why = now + CATCHING_UP + 2 * PATIENCE, HELD_UP
+        was_suspended = now - before > SUSPENDED
+        if was_suspended or now >= self._until:
+            self._why = LATE if was_suspended else HELD_UP
+        if was_suspended or is_silent:
+            self._until = now + CATCHING_UP + 2 * PATIENCE  # the next look may be two attempts to reach a service away
         return self._why if now < self._until else ""
 
 
@@ -125,7 +126,8 @@ class Follower:
         self._actions = GoalServers(bus, robot, self._refusal, report)
         self._seen = time.monotonic()  # s; the time of the last fresh odom, or of the start of the journey
         self._policy = YieldPolicy(bus.source, "--held" if held else "", robot)
-        self._now: Planar = STOP
+        self._now: Planar = STOP  # the last command
+        self._sent = -math.inf  # s; when that was sent
         self._robot, self._began, self._others = robot, time.monotonic(), ""
         self._yielded = False
         self._strafes = True  # until a status says otherwise, which is reported once
@@ -182,6 +184,10 @@ class Follower:
                 self._report(f"goal_pose: ({x:.2f}, {y:.2f}) by {received.source or 'an unknown sender'}")
                 self._set_out(Journey("goal_pose", [(x, y, theta)]), "a newer goal came on goal_pose")
         if journey := self._actions.take():
+            if late == LATE:  # a link that is held up for so long is lost, with the requests that wait in it
+                self._report(f"{journey.origin}: refused: {late}")
+                journey.give_up(late)
+                return self._wanted
             self._set_out(journey, "a newer goal came")
             journey.begin()
         return self._wanted
@@ -258,6 +264,8 @@ class Follower:
             if arrived(left, self._now, self.gains):
                 self.halt()
                 return leg
+            if min(stamp - before, time.monotonic() - self._sent) > COMMAND_SILENCE:
+                self._now = STOP  # this process was suspended, and the robot has stopped
             if stamp - before >= PERIOD - 1e-6:
                 self._command(velocity(left, self._now, self.gains, min(stamp - before, 2 * PERIOD)))
                 before = stamp
@@ -329,7 +337,7 @@ class Follower:
 
     def _command(self, planar: Planar) -> None:
         self._commands.put(Twist.planar(*planar))
-        self._now = planar
+        self._now, self._sent = planar, time.monotonic()
 
     def _report_hold(self, text: str) -> None:
         """Report once why this controller waits, and with an empty text that it goes on."""

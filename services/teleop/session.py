@@ -16,6 +16,7 @@ from .control.twist_mapper import TwistMapper
 from .input.kitty import Event, Focus, Key, Unknown
 
 FASTER = {"faster": 1.1, "slower": 0.9}  # a gamepad's buttons
+STOP_RATE = 20.0  # Hz; a stop is repeated at least as often, however slow the commands are
 RESUME_TIMEOUT = 0.2  # s; the keys wait while the sim is asked
 UNSEEN = "the window lost focus: stopped"
 BLIND = "odom was lost: stopped; press a key again to drive"
@@ -159,7 +160,8 @@ class Session:
         """Publish the mapper's command at `now`, if it has one."""
         since = self.mapper.stopping_since()
         self.sent = self.mapper.command(now, since is not None and self.client.odom.rests(since))
-        self.due = now + 1 / (self.mapper.settings.repeat_rate or 20.0)
+        rate = self.mapper.settings.repeat_rate
+        self.due = now + 1 / (rate if rate and since is None else max(rate, STOP_RATE))
         if self.sent is not None:
             self.client.put(self.sent)
 

@@ -159,13 +159,17 @@ def test_a_ros_node_is_a_client_of_our_actions(wire: Wire, theirs: "Theirs") -> 
     fibonacci, begun, feedback = find(FIBONACCI), list[Goal](), list[Any]()
     server = ActionServer(wire.bus("maths"), "fibonacci", fibonacci, lambda _: "", lambda _, goal: begun.append(goal))
     server.start()
-    joined(wire)
+    gateway = joined(wire)
     wait_for(lambda: "/fibonacci/_action/feedback" in theirs.topics())
     parts = {f"/fibonacci/_action/{part}" for part in ("send_goal", "get_result")}
     wait_for(lambda: parts <= theirs.services().keys())
     theirs.subscriber("/fibonacci/_action/feedback", f"{FIBONACCI}_FeedbackMessage", feedback.append)
     send = theirs.client("/fibonacci/_action/send_goal", f"{FIBONACCI}_SendGoal")
     result = theirs.client("/fibonacci/_action/get_result", f"{FIBONACCI}_GetResult")
+    late = b"\0\1\0\0" + bytes(16 * [6]) + (3).to_bytes(4, "little")
+    (reply,) = send.querier.get(payload=late, attachment=sample(1, time.time() - 1.0).packed())
+    gateway.wait_for_line("ros2: /fibonacci/_action/send_goal: it was sent more than 0.5 s from")
+    assert not reply.ok.payload.to_bytes()[4] and not begun, "it is rejected: it may have waited on its way"
     identity = theirs.type("unique_identifier_msgs/msg/UUID")(uuid=numpy.full(16, 7, numpy.uint8))
     assert send.call(goal_id=identity, goal=theirs.type(f"{FIBONACCI}_Goal")(order=3)).accepted
     (goal,) = begun

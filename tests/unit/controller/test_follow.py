@@ -33,10 +33,10 @@ from holozen.messages import (
 from holozen.messages import nav2_msgs as nav
 from holozen.messages.unique_identifier_msgs import UUID
 from holozen.testing import Wire, wait_for
-from holozen.transport.actions import State
+from holozen.transport.actions import State, new_id
 from holozen.transport.errors import ServiceError
 from holozen.transport.pubsub import Publisher, Subscription
-from services.controller.follow import HELD_UP, Follower
+from services.controller.follow import HELD_UP, LATE, Backlog, Follower
 from services.controller.goto import Gains, Leg
 
 QUICK = Gains(max_speed=2, max_turn=5, max_acceleration=10, max_turn_acceleration=20, linear=3, angular=3)
@@ -362,17 +362,44 @@ def test_a_goal_of_goal_pose_is_dropped_by_a_reset_and_the_list_is_driven_after_
     assert [leg.goal for leg in lap.result(60)] == GOALS
 
 
-def test_a_goal_is_aborted_after_the_controller_was_suspended(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+def navigate(case: Case, x: float) -> Callable[[], int]:
+    """Send a goal of the action; what waits for the state in which it ends."""
     send, result = nav.NavigateToPose.Impl.SendGoalService, nav.NavigateToPose.Impl.GetResultService
-    client, goal = case.robot.bus, nav.NavigateToPoseGoal(PoseStamped(pose=Pose(Point(1e4))))
+    key, goal, client = "navigate_to_pose/_action", UUID(list(new_id())), case.robot.bus
+    request = send.Request(goal, nav.NavigateToPoseGoal(PoseStamped(pose=Pose(Point(x)))))
+    assert client.call(f"{key}/send_goal", request, send.Response).accepted
+    return lambda: int(client.call(f"{key}/get_result", result.Request(goal), result.Response, 30).status)
+
+
+def test_a_goal_is_aborted_after_the_controller_was_suspended(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     case.lap()
-    client.call("navigate_to_pose/_action/send_goal", send.Request(UUID([7] * 16), goal), send.Response)
+    end = navigate(case, 1e4)
     wait_for(lambda: case.robot.heard)
     # Its clock has gone on when the next odom comes.
     monkeypatch.setattr("services.controller.follow.time", SimpleNamespace(monotonic=lambda: time.monotonic() + 3.0))
-    reply = client.call("navigate_to_pose/_action/get_result", result.Request(UUID([7] * 16)), result.Response, 30)
-    assert reply.status == State.ABORTED
+    assert end() == State.ABORTED
     wait_for(lambda: case.robot.heard[-1] == Twist(), what="the robot to be stopped")
+
+
+def test_after_a_suspension_it_speeds_up_from_rest(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    offset = itertools.count()
+
+    def suspend(robot: Robot) -> None:
+        """A second has passed when the next odom comes."""
+        robot.time, passed = robot.time + 1.0, next(offset) + 1.0
+        clock = SimpleNamespace(monotonic=lambda: time.monotonic() + passed)
+        monkeypatch.setattr("services.controller.follow.time", clock)
+
+    case.lap()
+    send(case, 1e4, 0.0)
+    wait_for(lambda: case.robot.heard and case.robot.heard[-1].linear.x == pytest.approx(2.0))
+    case.robot.heard.clear()
+
+    def slows_down() -> bool:
+        case.robot.resets.append(suspend)
+        return any(0 < command.linear.x < 1.1 for command in case.robot.heard)
+
+    wait_for(slows_down, what="a command at which the robot speeds up from rest")
 
 
 def test_a_goal_that_waited_for_a_suspended_controller_is_refused(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -380,9 +407,21 @@ def test_a_goal_that_waited_for_a_suspended_controller_is_refused(case: Case, mo
     monkeypatch.setattr("services.controller.follow.time", SimpleNamespace(monotonic=lambda: next(clock)))
     lap = case.lap()
     send(case, -0.4, 0.3)
-    wait_for(lambda: "goal_pose: refused: the controller was suspended when it was sent; send it again" in case.reports)
+    reason = "refused: the controller was suspended when it was sent; send it again"
+    wait_for(lambda: f"goal_pose: {reason}" in case.reports)
+    assert navigate(case, 1e4)() == State.ABORTED
+    assert f"navigate_to_pose: {reason}" in case.reports and not case.robot.heard
     case.goals()
     assert [leg.goal for leg in lap.result(30)] == GOALS
+
+
+@pytest.mark.parametrize(("began", "is_silent", "why"), [(3.0, False, LATE), (1.0, True, HELD_UP)])
+def test_a_goal_is_refused_at_the_first_look_at_which_it_can_be_there(began: float, is_silent: bool, why: str) -> None:
+    backlog = Backlog()
+    assert not backlog.look(0.0, False)
+    looks = [(began, is_silent), (began + 1.0, False), (began + 2.0, False)]  # a second apart without a list of goals
+    assert [backlog.look(now, silent) for now, silent in looks] == [why, why, ""]
+    assert [backlog.look(now, True) for now in (9.0, 9.1)] == [LATE, LATE], "odom comes a moment later"
 
 
 def test_a_goal_that_a_link_may_have_held_up_is_refused(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -157,8 +157,9 @@ def test_a_key_that_timed_out_is_a_stop(wire: Wire, robot: Robot) -> None:
     assert tick(session, robot.heard)[0] == Twist()
 
 
-def test_a_stop_is_repeated_until_odom_that_is_newer_shows_rest(wire: Wire, robot: Robot) -> None:
-    session = session_of(wire, robot)
+@pytest.mark.parametrize("rate", [0.0, 0.01])
+def test_a_stop_is_repeated_until_odom_that_is_newer_shows_rest(wire: Wire, robot: Robot, rate: float) -> None:
+    session = session_of(wire, robot, Settings(mode=LATCH, repeat_rate=rate))
     press(session, "i")
     see(session, robot, 0.5)
     robot.heard()
