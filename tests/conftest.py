@@ -14,13 +14,15 @@ What is tried often, to be sure, is tried more often by `scripts/test --long`, w
 import os
 import shutil
 import signal
+import subprocess
 from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from holozen.process import Ending
+from holozen import cli
+from holozen.process import SIGNALS, Ending
 
 HERE = Path(__file__).parent
 PACKAGES = dict(line.split(" ", 1) for line in (HERE / "packages.txt").read_text().splitlines())
@@ -81,6 +83,24 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Generator[None, None, Non
 def trials() -> Callable[[int, int], int]:
     """`trials(short, long)`: how often to try; `long` in a run of `scripts/test --long`."""
     return lambda short, long: long if LONG else short
+
+
+@pytest.fixture
+def call(capfd: pytest.CaptureFixture[str]) -> Generator[Callable[..., subprocess.CompletedProcess[str]], None, None]:
+    """`call("topic", "list")`: run `holozen topic list` in this process. For what verbs write, which needs no other."""
+    handlers = {number: signal.getsignal(number) for number in (*SIGNALS, signal.SIGTSTP)}
+
+    def run(*words: str) -> subprocess.CompletedProcess[str]:
+        capfd.readouterr()
+        try:
+            code = cli.main([*words])
+        except SystemExit as end:
+            code = int(end.code or 0)
+        return subprocess.CompletedProcess(words, code, *capfd.readouterr())
+
+    yield run
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
 
 
 @pytest.hookimpl(tryfirst=True)

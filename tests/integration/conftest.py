@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterator
 import pytest
 import zenoh
 
-from holozen import cli
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.errors import ServiceError
 
 from .robots import Robot
+
+Verb = Callable[..., subprocess.CompletedProcess[str]]
 
 
 @pytest.fixture(scope="module")
@@ -49,18 +50,11 @@ def robot(only_robot: Robot) -> Robot:
 
 
 @pytest.fixture
-def verb(capsys: pytest.CaptureFixture[str]) -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Run `holozen VERB WORDS...` on a wire, in this process: for tests of what verbs write."""
-
-    def run(wire: Wire, *words: str) -> subprocess.CompletedProcess[str]:
-        capsys.readouterr()
-        try:
-            code = cli.main([*words, *wire.flags])
-        except SystemExit as end:
-            code = int(end.code or 0)
-        return subprocess.CompletedProcess(words, code, *capsys.readouterr())
-
-    return run
+def verb(call: Verb) -> Verb:
+    """`verb(wire, "topic", "list")`: run `holozen topic list` on a wire, in this process. As a process of its own each
+    verb is tried in test_every_verb.py.
+    """
+    return lambda wire, *words: call(*words, *wire.flags)
 
 
 def start_sim(wire: Wire, *flags: str) -> Process:

@@ -2,8 +2,7 @@
 
 import json
 import signal
-import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -14,11 +13,10 @@ from holozen.messages.geometry_msgs import Point, Pose
 from holozen.messages.std_msgs import Header
 from holozen.testing import LockStep, Process, Wire, wait_for
 
-from .conftest import start_sim
+from .conftest import Verb, start_sim
 from .processes import assert_one_line
 from .robots import Robot, moves, place, rests
 
-Verb = Callable[..., subprocess.CompletedProcess[str]]
 BOT = str(data.find("urdf", "hb_bot.urdf.xacro"))
 FAR = 1e5  # m; a goal that is not reached
 END = "the controller "

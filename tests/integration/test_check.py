@@ -2,12 +2,15 @@
 
 import json
 import subprocess
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from holozen import data
 from holozen.testing.wire import command
+
+from .conftest import Verb
 
 BOT = data.find("urdf", "hb_bot.urdf.xacro")
 TYPO = """<robot name="r">
@@ -19,12 +22,13 @@ WARNS = """<robot name="r">
 <collision><geometry><sphere radius="0.1"/></geometry></collision></link></robot>"""
 
 
-def run(*words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command("check", *words), capture_output=True, text=True, timeout=30)
+@pytest.fixture
+def run(call: Verb) -> Verb:
+    return partial(call, "check")
 
 
-def test_a_good_file_is_summed_up_in_one_line(tmp_path: Path) -> None:
-    done = run(str(BOT))
+def test_a_good_file_is_summed_up_in_one_line(run: Verb, tmp_path: Path) -> None:
+    done = subprocess.run(command("check", str(BOT)), capture_output=True, text=True, timeout=30)
     assert (done.returncode, done.stdout, done.stderr) == (0, "ok: 5 links, 3 wheels, planar_move on cmd_vel\n", "")
     assert run(str(BOT), "--json").stdout == ""
     (tmp_path / "r.urdf").write_text(WARNS.replace("9", "0.004"))
@@ -37,14 +41,14 @@ def test_a_good_file_is_summed_up_in_one_line(tmp_path: Path) -> None:
     )
 
 
-def test_a_file_without_links_is_an_error_unless_it_is_for_others_to_include(tmp_path: Path) -> None:
+def test_a_file_without_links_is_an_error_unless_it_is_for_others_to_include(run: Verb, tmp_path: Path) -> None:
     for name in ("r.urdf", "r.xacro"):
         (tmp_path / name).write_text('<robot name="r"/>')
         done = run(str(tmp_path / name))
         assert (done.returncode, done.stdout.count("error: <robot name='r'> has no <link>")) == (1, 1), done
 
 
-def test_an_error_is_reported_with_its_line_and_the_fix(tmp_path: Path) -> None:
+def test_an_error_is_reported_with_its_line_and_the_fix(run: Verb, tmp_path: Path) -> None:
     (tmp_path / "r.urdf").write_text(TYPO)
     done = run(str(tmp_path / "r.urdf"))
     assert (done.returncode, done.stderr) == (1, "")
@@ -54,14 +58,14 @@ def test_an_error_is_reported_with_its_line_and_the_fix(tmp_path: Path) -> None:
     assert "write iyz=" in why or "write ixz=" in why or "write ixy=" in why
 
 
-def test_warnings_alone_are_no_failure(tmp_path: Path) -> None:
+def test_warnings_alone_are_no_failure(run: Verb, tmp_path: Path) -> None:
     (tmp_path / "r.urdf").write_text(WARNS)
     done = run(str(tmp_path / "r.urdf"))
     assert done.returncode == 0
     assert ": warning: " in done.stdout and "[inertia-size]" in done.stdout
 
 
-def test_json_has_one_object_a_line(tmp_path: Path) -> None:
+def test_json_has_one_object_a_line(run: Verb, tmp_path: Path) -> None:
     (tmp_path / "r.urdf").write_text(TYPO)
     done = run(str(tmp_path / "r.urdf"), "--json")
     (finding,) = map(json.loads, done.stdout.splitlines())
@@ -70,7 +74,7 @@ def test_json_has_one_object_a_line(tmp_path: Path) -> None:
     assert (finding["line"], finding["rule"], finding["severity"]) == (3, "attribute", "error")
 
 
-def test_a_task_sets_size_and_names(tmp_path: Path) -> None:
+def test_a_task_sets_size_and_names(run: Verb, tmp_path: Path) -> None:
     (tmp_path / "names.txt").write_text("link base_link\nlink body\n")
     done = run(str(BOT), "--fits", "0.4x0.2", "--require", str(tmp_path / "names.txt"))
     assert done.returncode == 1
@@ -87,12 +91,12 @@ def test_a_task_sets_size_and_names(tmp_path: Path) -> None:
         (["--fits", "400x200"], "(length, width, height), each at most 20"),
     ],
 )
-def test_wrong_words_are_reported(words: list[str], expected: str) -> None:
+def test_wrong_words_are_reported(run: Verb, words: list[str], expected: str) -> None:
     done = run(str(BOT), *words)
     assert done.returncode == 2
     assert expected in done.stderr and "Traceback" not in done.stderr
 
 
-def test_a_file_that_is_not_there_is_one_finding(tmp_path: Path) -> None:
+def test_a_file_that_is_not_there_is_one_finding(run: Verb, tmp_path: Path) -> None:
     done = run(str(tmp_path / "nowhere.xacro"))
     assert (done.returncode, len(done.stdout.splitlines()), done.stderr) == (1, 2, "")

@@ -2,15 +2,13 @@
 
 import contextlib
 import re
-import subprocess
-from collections.abc import Callable
 
 import pytest
 
 from holozen.testing import Process, Terminal, Wire, wait_for
 from holozen.transport.errors import ServiceError
 
-from .conftest import start_sim
+from .conftest import Verb, start_sim
 from .processes import assert_one_line
 from .robots import Robot, distance, moves, place, rests
 
@@ -205,6 +203,6 @@ def test_it_has_patience_with_a_pose_service_that_comes_last_and_goes(wire: Wire
     assert [lap for lap, *_ in legs(controller)] == ["1"] * 4
 
 
-def test_a_wrong_flag_is_one_error_line(wire: Wire, verb: Callable[..., subprocess.CompletedProcess[str]]) -> None:
+def test_a_wrong_flag_is_one_error_line(wire: Wire, verb: Verb) -> None:
     for words, reason in ((["a/b"], "robot name 'a/b'"), (["--tolerance", "nan"], "'nan'")):
         assert_one_line(verb(wire, "controller", *words), 2, reason)

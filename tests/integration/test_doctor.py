@@ -22,6 +22,8 @@ from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 from holozen.transport import graph
 
+from .conftest import Verb
+
 REPO = Path(__file__).parents[2]
 HOLD = """
 import socket, sys, time
@@ -32,9 +34,9 @@ time.sleep(999)
 Rows = list[dict[str, str]]
 
 
-def doctor(wire: Wire, *words: str) -> tuple[int, Rows]:
+def doctor(verb: Verb, wire: Wire, *words: str) -> tuple[int, Rows]:
     """Its exit code and findings, all with a fix unless all is well."""
-    done = wire.run("doctor", "--json", *words)
+    done = verb(wire, "doctor", "--json", *words)
     rows = [json.loads(line) for line in done.stdout.splitlines()]
     assert done.stderr == ""
     assert all(set(row) == {"check", "level", "text", "fix"} for row in rows)
@@ -48,11 +50,11 @@ def bad(rows: Rows, check: str) -> list[str]:
     return [f"{row['level']}: {row['text']}" for row in rows if row["check"] == check and row["level"] != "ok"]
 
 
-def doctor_when_bad(wire: Wire, check: str) -> tuple[int, Rows]:
+def doctor_when_bad(verb: Verb, wire: Wire, check: str) -> tuple[int, Rows]:
     """As `doctor`, once something is wrong in one respect: a busy machine shows a node or a topic late."""
 
     def look() -> tuple[int, Rows] | None:
-        code, rows = doctor(wire)
+        code, rows = doctor(verb, wire)
         return (code, rows) if bad(rows, check) else None
 
     found = wait_for(look)
@@ -66,13 +68,13 @@ def door(wire: Wire) -> Bus:
     return wire.bus("door", lasting=True)
 
 
-def test_with_a_robot_that_drives_all_is_well_and_a_stop_is_reported_as_no_error(wire: Wire) -> None:
+def test_with_a_robot_that_drives_all_is_well_and_a_stop_is_reported_as_no_error(verb: Verb, wire: Wire) -> None:
     wire.start("sim").wait_for_line("listens on")
     wire.start("pose-service").wait_for_line("goals")
     controller = wire.start("controller")
     odom = wire.bus().latest("odom", Odometry)
     wait_for(lambda: (now := odom.read()[0]) and not now.twist.twist.is_slow(0.1))
-    code, rows = doctor(wire)
+    code, rows = doctor(verb, wire)
     assert (code, [row for row in rows if row["level"] == "error"]) == (0, [])
     texts = " ".join(row["text"] for row in rows)
     assert "3 of this version: controller (pid" in texts
@@ -81,18 +83,18 @@ def test_with_a_robot_that_drives_all_is_well_and_a_stop_is_reported_as_no_error
     assert controller.returncode is None
     assert "yields" not in controller.err
     wait_for(lambda: (now := odom.read()[0]) and not now.twist.twist.is_slow(0.1), what="it to drive on")
-    assert wire.run("stop").returncode == 0
-    code, rows = doctor(wire)
+    assert verb(wire, "stop").returncode == 0
+    code, rows = doctor(verb, wire)
     assert (code, bad(rows, "cmd_vel")[0].startswith("warning: hb_bot is stopped by stop@")) == (0, True)
 
 
-def test_a_paused_sim_is_a_warning_until_it_plays(wire: Wire) -> None:
+def test_a_paused_sim_is_a_warning_until_it_plays(verb: Verb, wire: Wire) -> None:
     wire.start("sim").wait_for_line("listens on")
-    assert wire.run("sim", "pause").returncode == 0
-    code, rows = doctor(wire)
+    assert verb(wire, "sim", "pause").returncode == 0
+    code, rows = doctor(verb, wire)
     assert (code, bad(rows, "sim")) == (0, ["warning: the sim is paused: its robots stand still"])
-    assert wire.run("sim", "play").returncode == 0
-    assert bad(doctor(wire)[1], "sim") == []
+    assert verb(wire, "sim", "play").returncode == 0
+    assert bad(doctor(verb, wire)[1], "sim") == []
 
 
 @pytest.mark.needs("ip", "unshare")
@@ -104,37 +106,37 @@ def test_with_no_network_and_nothing_running_all_is_well() -> None:
 
 
 @pytest.mark.parametrize("mode", ["peer", "client"])
-def test_a_missing_router_is_reported(wire: Wire, mode: str) -> None:
-    code, rows = doctor(wire, "--mode", mode)
+def test_a_missing_router_is_reported(verb: Verb, wire: Wire, mode: str) -> None:
+    code, rows = doctor(verb, wire, "--mode", mode)
     assert code == 1
     assert bad(rows, "port") == [f"error: {wire.endpoint} cannot be reached: Connection refused"]
     assert f"--listen tcp/0.0.0.0:{wire.port}" in next(row["fix"] for row in rows if row["check"] == "port")
 
 
 @pytest.mark.parametrize("mode", ["peer", "client"])
-def test_a_holder_of_the_port_that_speaks_no_zenoh_is_named(wire: Wire, mode: str) -> None:
+def test_a_holder_of_the_port_that_speaks_no_zenoh_is_named(verb: Verb, wire: Wire, mode: str) -> None:
     with Process([sys.executable, "-c", HOLD, str(wire.port)]) as holder:
         holder.wait_for_line("up")
-        _, rows = doctor(wire, "--mode", mode)
+        _, rows = doctor(verb, wire, "--mode", mode)
     (text,) = bad(rows, "port")
     assert f"(pid {holder.pid}), which does not speak Zenoh" in text
     assert f"kill {holder.pid}" in next(row["fix"] for row in rows if row["check"] == "port")
 
 
-def test_a_sleeping_holder_of_the_port_is_to_be_woken(wire: Wire) -> None:
+def test_a_sleeping_holder_of_the_port_is_to_be_woken(verb: Verb, wire: Wire) -> None:
     router = wire.start("router")
-    wait_for(lambda: "speaks Zenoh" in str(doctor(wire)[1]))
+    wait_for(lambda: "speaks Zenoh" in str(doctor(verb, wire)[1]))
     router.signal(signal.SIGSTOP)
-    _, rows = doctor(wire)
+    _, rows = doctor(verb, wire)
     router.signal(signal.SIGCONT)
     assert "stopped as by Ctrl-Z" in bad(rows, "port")[0]
     assert str(rows).count(f"kill -CONT {router.pid}") == 1
     assert bad(rows, "zenoh") == []  # it is reported once
 
 
-def test_odom_that_does_not_come_is_stale(wire: Wire, door: Bus) -> None:
+def test_odom_that_does_not_come_is_stale(verb: Verb, wire: Wire, door: Bus) -> None:
     publisher = wire.bus("sim").publisher("Fred/odom", Odometry)
-    code, rows = doctor_when_bad(wire, "odom")
+    code, rows = doctor_when_bad(verb, wire, "odom")
     (text,) = bad(rows, "odom")
     assert re.match(r"error: Fred/odom is stale: nothing from sim for \d+\.\d s", text)
     assert code == 1
@@ -161,15 +163,15 @@ def commanding(*buses: Bus) -> Iterator[None]:
         thread.join()
 
 
-def test_two_sources_that_fight_for_a_robot_and_two_sims_on_one_key_are_reported(wire: Wire) -> None:
+def test_two_sources_that_fight_for_a_robot_and_two_sims_on_one_key_are_reported(verb: Verb, wire: Wire) -> None:
     sim = wire.start("sim")
     sim.wait_for_line("listens on")
     with commanding(wire.bus("left"), wire.bus("right")):
-        (text,) = wait_for(lambda: bad(doctor(wire)[1], "cmd_vel"), within=30)
+        (text,) = wait_for(lambda: bad(doctor(verb, wire)[1], "cmd_vel"), within=30)
     assert text.startswith("error: 2 sources command hb_bot at once: left@")
     assert "DATA" in text and "not obeyed" in text and "right@" in text
     clock = wire.bus("other", lasting=True).publisher("clock", Clock)  # our own sim would refuse
-    code, rows = doctor_when_bad(wire, "duplicates")
+    code, rows = doctor_when_bad(verb, wire, "duplicates")
     (text,) = bad(rows, "duplicates")
     assert code == 1 and text.startswith("error: ")
     assert all(
@@ -193,31 +195,31 @@ def foreign(wire: Wire, change: Callable[[dict[str, Any]], None]) -> tuple[Any, 
     return bus.session.declare_queryable(graph.node_info_key(bus.id), answer), bus.announce("node")
 
 
-def test_a_clock_that_is_off_is_reported(wire: Wire, door: Bus) -> None:
+def test_a_clock_that_is_off_is_reported(verb: Verb, wire: Wire, door: Bus) -> None:
     held = foreign(wire, lambda row: row.__setitem__("time", row["time"] + 3))
-    code, rows = doctor_when_bad(wire, "clock")
+    code, rows = doctor_when_bad(verb, wire, "clock")
     (text,) = bad(rows, "clock")
     found = re.match(r"error: the clock of elsewhere is ([+-].+) s from ours \(give or take (.+) s\)", text)
     assert found and code == 1 and held, text
     assert float(found[1]) == pytest.approx(3, abs=float(found[2]) + 1e-3)
 
 
-def test_another_version_is_reported(wire: Wire, door: Bus) -> None:
+def test_another_version_is_reported(verb: Verb, wire: Wire, door: Bus) -> None:
     held = foreign(wire, lambda row: row.__setitem__("version", "0.0.1"))
-    code, rows = doctor_when_bad(wire, "nodes")
+    code, rows = doctor_when_bad(verb, wire, "nodes")
     (text,) = bad(rows, "nodes")
     expected = f"warning: foreign (pid 7 on elsewhere) has holozen 0.0.1, this is {graph.version('holozen')}"
     assert (code, text, bool(held)) == (0, expected, True)
 
 
-def test_a_node_that_does_not_answer_is_reported(wire: Wire, door: Bus) -> None:
+def test_a_node_that_does_not_answer_is_reported(verb: Verb, wire: Wire, door: Bus) -> None:
     bus = wire.bus("mute")
     held = (
         bus.announce("node"),
         bus.session.declare_queryable(graph.node_info_key(bus.id), lambda query: queries.append(query)),
     )
     queries: list[Any] = []
-    _, rows = doctor_when_bad(wire, "nodes")
+    _, rows = doctor_when_bad(verb, wire, "nodes")
     (text,) = bad(rows, "nodes")
     assert (text.startswith(f"warning: mute ({bus.id[:6]}) does not answer"), bool(held)) == (True, True)
     queries.clear()
@@ -241,8 +243,8 @@ def test_a_missing_wheel_is_reported(wire: Wire, tmp_path: Path, lacks: str, lev
     assert "port: " in done.stdout  # everything else is checked all the same
 
 
-def test_a_wrong_configuration_is_one_error_line(wire: Wire) -> None:
-    code, rows = doctor(wire, "--config", "/nowhere.json5")
+def test_a_wrong_configuration_is_one_error_line(verb: Verb, wire: Wire) -> None:
+    code, rows = doctor(verb, wire, "--config", "/nowhere.json5")
     (text,) = bad(rows, "zenoh")
     assert (code, "/nowhere.json5" in text) == (1, True)
 

@@ -1,6 +1,6 @@
 """Every verb alone, beside what runs, and interrupted: no traceback, one line, the right exit code.
 
-A test tries all verbs of its kind side by side, each as a process.
+A test tries all verbs of its kind: side by side, each as a process, or one after the other in this one.
 """
 
 import itertools
@@ -28,7 +28,7 @@ from holozen.messages import Odometry
 from holozen.testing import Terminal, Wire, wait_for
 from holozen.testing.wire import command, free_port
 
-from .conftest import foreign_config, start_sim
+from .conftest import Verb, foreign_config, start_sim
 from .foreign_samples import PUTS
 from .verbs import VERBS, Row
 
@@ -36,6 +36,7 @@ BOT = data.find("urdf", "hb_bot.urdf.xacro")
 BALL = """<robot name="ball"><link name="b"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>
 <collision><geometry><sphere radius="0.1"/></geometry></collision></link></robot>"""
 SIDE_BY_SIDE, MANY = 6, 20  # processes at once: those that work, and those that mostly wait
+HERE = 0  # one after the other, in the main thread of this process
 
 RACE = "dispatcher/resource.rs"
 """Where a thread of Zenoh's panics when many sessions come and go beside each other: eclipse-zenoh/zenoh#2624."""
@@ -119,7 +120,7 @@ def busy(town: Wire, files: Files) -> Iterator[Wire]:
 
     They take processor time as long as they run, so the tests that need none of it come first.
     """
-    start_sim(town)
+    start_sim(town, "--rtf", "0.2")  # nothing waits for its time, and it costs less
     with Bus("setup", town.connection) as bus:  # gone again: every verb would connect to it
         spawn_file(bus, BOT, "Spare", Place(x=2.0))
         spawn_file(bus, BOT, "Free", Place(x=-8.0))  # `stop Spare` runs beside `release Free`
@@ -145,9 +146,10 @@ def _talk(session: zenoh.Session, done: threading.Event) -> None:
 
 
 def tries(names: list[str], attempt: Callable[[str], T], at_once: int = SIDE_BY_SIDE) -> Iterator[tuple[str, T]]:
-    """What came of the same try with many verbs, side by side, but for those that Zenoh's own race took part in."""
-    with ThreadPoolExecutor(at_once) as pool:
-        done = dict(zip(names, pool.map(attempt, names), strict=True))
+    """What came of the same try with many verbs, but for those that Zenoh's own race took part in."""
+    with ThreadPoolExecutor(at_once or 1) as pool:
+        outcomes = (pool.map if at_once else map)(attempt, names)
+        done = dict(zip(names, outcomes, strict=True))
     for name, outcome in done.items():
         if RACE in str(outcome):
             RACED.append(name)
@@ -234,12 +236,14 @@ def test_ctrl_c_ends_what_waits(files: Files) -> None:
 # --- beside what runs
 
 
-def test_it_does_its_work(busy: Wire, files: Files) -> None:
+def test_it_does_its_work(busy: Wire, files: Files, call: Verb) -> None:
+    """As a process it does it as JSON, below."""
+
     def attempt(name: str) -> Done:
         row = VERBS[name]
-        return run(files.words(name, row.live or "", "text") + flags(row, busy))
+        return call(*files.words(name, row.live or "", "text"), *flags(row, busy))
 
-    for name, done in tries(TEXT, attempt):
+    for name, done in tries(TEXT, attempt, HERE):
         assert done.returncode in {VERBS[name].code, int(name == "doctor")}, f"{name}: {done.stderr}"
         assert done.stdout or done.stderr, name
         assert is_clean(done.stderr), f"{name}: {done.stderr}"
@@ -270,12 +274,12 @@ def test_a_reader_that_is_gone_ends_it_quietly(busy: Wire, files: Files) -> None
         assert is_clean(done.stderr) and "Broken pipe" not in done.stderr, f"{name}: {done.stderr}"
 
 
-def test_what_is_wrong_is_one_line(busy: Wire, files: Files) -> None:
+def test_what_is_wrong_is_one_line(busy: Wire, files: Files, call: Verb) -> None:
     def attempt(name: str) -> Done:
         row = VERBS[name]
-        return run(files.words(name, (row.wrong or ("",))[0], "wrong") + flags(row, busy))
+        return call(*files.words(name, (row.wrong or ("",))[0], "wrong"), *flags(row, busy))
 
-    for name, done in tries(WRONG, attempt):
+    for name, done in tries(WRONG, attempt, HERE):
         _, code, part = VERBS[name].wrong or ("", 0, "")
         assert_one_line(name, done, code, part)
 

@@ -14,7 +14,7 @@ from holozen.messages import TriggerReply, TriggerRequest
 from holozen.testing import Wire, wait_for
 from holozen.testing.wire import command
 
-from .conftest import foreign_config
+from .conftest import Verb, foreign_config
 from .foreign_samples import CDR, PUTS
 from .processes import assert_one_line
 
@@ -41,7 +41,7 @@ def _talk(session: zenoh.Session, done: threading.Event) -> None:
             session.put(key, payload, encoding=encoding)
 
 
-def test_what_a_foreign_node_puts_is_shown(town: Wire) -> None:
+def test_what_a_foreign_node_puts_is_shown(verb: Verb, town: Wire) -> None:
     for words, shown in [
         ("a/json", "speed: 1.5\nname: x\n---\n"),
         ("a/json --json", '{"speed": 1.5, "name": "x"}\n'),
@@ -54,7 +54,7 @@ def test_what_a_foreign_node_puts_is_shown(town: Wire) -> None:
         ("a/json --json --field speed", '{"value": 1.5}\n'),
         ("a/js$* --json", '{"key": "a/json", "value": {"speed": 1.5, "name": "x"}}\n'),
     ]:
-        done = town.run("topic", "echo", *words.split(), "--once")
+        done = verb(town, "topic", "echo", *words.split(), "--once")
         assert (done.returncode, done.stdout, done.stderr) == (0, shown, "")
 
 
@@ -83,8 +83,10 @@ ODOMETRY = "not a nav_msgs/msg/Odometry: cut off after 52 bytes; --type is wrong
         ("a/bytes --json", '{"hex": "c8c9ca', NEITHER),
     ],
 )
-def test_what_cannot_be_decoded_is_a_hex_dump_and_counted(town: Wire, words: str, start: str, why: str) -> None:
-    done = town.run("topic", "echo", *words.split(), "--once")
+def test_what_cannot_be_decoded_is_a_hex_dump_and_counted(
+    verb: Verb, town: Wire, words: str, start: str, why: str
+) -> None:
+    done = verb(town, "topic", "echo", *words.split(), "--once")
     assert done.returncode == 0
     assert done.stdout.startswith(start)
     assert done.stderr == f"holozen topic echo: 1 of 1 samples could not be decoded; {why}\n"
@@ -111,92 +113,92 @@ def test_every_key_of_an_expression_is_shown_with_its_name(town: Wire) -> None:
     assert "samples could not be decoded" in echo.err
 
 
-def test_a_type_is_known_from_the_publishers_token(town: Wire) -> None:
+def test_a_type_is_known_from_the_publishers_token(verb: Verb, town: Wire) -> None:
     """A publisher of ours declares its type; the bytes alone do not show it."""
     bus = town.bus("ours", wire="cdr")
     token = bus.announce("pub", "geometry_msgs/msg/Twist", "a/cdr")
-    assert town.run("topic", "echo", "a/cdr", "--once").stdout == SHOWN
+    assert verb(town, "topic", "echo", "a/cdr", "--once").stdout == SHOWN
     token.undeclare()
 
 
-def test_a_filter_that_nothing_passes_ends_with_the_timeout(town: Wire) -> None:
-    done = town.run("topic", "echo", "a/json", "--filter", "speed > 2", "--timeout", "1")
+def test_a_filter_that_nothing_passes_ends_with_the_timeout(verb: Verb, town: Wire) -> None:
+    done = verb(town, "topic", "echo", "a/json", "--filter", "speed > 2", "--timeout", "1")
     assert_one_line(done, 1, "no message that passes the filter on a/json within 1 s")
 
 
-def test_an_expression_shows_the_field_of_those_that_have_it(town: Wire) -> None:
-    done = town.run("topic", "echo", "**", "--field", "speed", "--json", "--once")
+def test_an_expression_shows_the_field_of_those_that_have_it(verb: Verb, town: Wire) -> None:
+    done = verb(town, "topic", "echo", "**", "--field", "speed", "--json", "--once")
     assert json.loads(done.stdout) == {"key": "a/json", "value": 1.5}
 
 
-def test_an_unknown_field_of_a_key_is_an_error_with_the_closest(town: Wire) -> None:
+def test_an_unknown_field_of_a_key_is_an_error_with_the_closest(verb: Verb, town: Wire) -> None:
     expected = "holozen topic echo: a/json: no field 'sped' (did you mean 'speed'?); there are speed, name"
-    assert_one_line(town.run("topic", "echo", "a/json", "--field", "sped"), 1, expected)
+    assert_one_line(verb(town, "topic", "echo", "a/json", "--field", "sped"), 1, expected)
 
 
-@pytest.mark.parametrize("verb", ["hz", "bw"])
-def test_rates_and_sizes_of_foreign_samples_are_reported_without_losses(town: Wire, verb: str) -> None:
-    done = town.run("topic", verb, "a/json", "--once")
+@pytest.mark.parametrize("measure", ["hz", "bw"])
+def test_rates_and_sizes_of_foreign_samples_are_reported_without_losses(verb: Verb, town: Wire, measure: str) -> None:
+    done = verb(town, "topic", measure, "a/json", "--once")
     assert (done.returncode, done.stderr) == (0, "")
     assert "lost" not in done.stdout
-    output = json.loads(town.run("topic", verb, "a/js$*", "--once", "--json").stdout)
+    output = json.loads(verb(town, "topic", measure, "a/js$*", "--once", "--json").stdout)
     assert (output["key"], output["lost"]) == ("a/json", None)
     assert {"p50", "p95", "p99", "jitter", "window"} <= set(output)
 
 
-def test_delay_reports_that_there_is_no_stamp(town: Wire) -> None:
+def test_delay_reports_that_there_is_no_stamp(verb: Verb, town: Wire) -> None:
     for ends in (("--timeout", "1"), ("--once",)):
-        done = town.run("topic", "delay", "a/json", *ends)
+        done = verb(town, "topic", "delay", "a/json", *ends)
         assert_one_line(done, 1, "holozen topic delay: ", " messages have no header.stamp, and so no age")
     delay = town.start("topic", "delay", "a/json")
     delay.wait_for_line("messages have no header.stamp, and so no age")
     assert "no new messages" not in delay.err
 
 
-def test_delay_reports_that_there_is_no_clock(town: Wire) -> None:
-    done = town.run("topic", "delay", "a/stamped", "--timeout", "1")
+def test_delay_reports_that_there_is_no_clock(verb: Verb, town: Wire) -> None:
+    done = verb(town, "topic", "delay", "a/stamped", "--timeout", "1")
     assert_one_line(done, 1, " messages have stamps by another clock than this machine's, and nothing comes on clock")
 
 
-def test_list_sees_foreign_nodes_if_it_listens(town: Wire) -> None:
-    assert town.run("topic", "list").stdout == ""
-    wait_for(lambda: town.run("topic", "list", "--heard", "0.3").stdout.split() == sorted(PUTS))
+def test_list_sees_foreign_nodes_if_it_listens(verb: Verb, town: Wire) -> None:
+    assert verb(town, "topic", "list").stdout == ""
+    wait_for(lambda: verb(town, "topic", "list", "--heard", "0.3").stdout.split() == sorted(PUTS))
 
 
-def test_info_shows_what_a_foreign_node_sends(town: Wire) -> None:
-    done = town.run("topic", "info", "a/json", "-v")
+def test_info_shows_what_a_foreign_node_sends(verb: Verb, town: Wire) -> None:
+    done = verb(town, "topic", "info", "a/json", "-v")
     assert done.stdout.splitlines()[1:] == [
         "Publisher count: 1",
         "  anonymous  DATA  application/json  DROP when full",
         "Subscription count: 0",
     ]
-    assert town.run("topic", "info", "a/json").stdout == done.stdout
-    assert town.run("topic", "info", "a/schema").stdout.startswith(
+    assert verb(town, "topic", "info", "a/json").stdout == done.stdout
+    assert verb(town, "topic", "info", "a/schema").stdout.startswith(
         "Type: geometry_msgs/msg/Twist\nPublisher count: 1\n"
     )
-    assert_one_line(town.run("topic", "info", "a/nothing"), 1, "unknown key 'a/nothing': no nodes found at ")
+    assert_one_line(verb(town, "topic", "info", "a/nothing"), 1, "unknown key 'a/nothing': no nodes found at ")
 
 
-def test_type_shows_what_a_foreign_node_sends(town: Wire) -> None:
-    assert town.run("topic", "type", "a/schema").stdout == "geometry_msgs/msg/Twist\n"
+def test_type_shows_what_a_foreign_node_sends(verb: Verb, town: Wire) -> None:
+    assert verb(town, "topic", "type", "a/schema").stdout == "geometry_msgs/msg/Twist\n"
     expected = "holozen topic type: 'a/json' has no known type; its samples are application/json"
-    assert_one_line(town.run("topic", "type", "a/json"), 1, expected)
+    assert_one_line(verb(town, "topic", "type", "a/json"), 1, expected)
 
 
-def test_a_foreign_node_that_only_answers_is_reported_too(town: Wire) -> None:
+def test_a_foreign_node_that_only_answers_is_reported_too(verb: Verb, town: Wire) -> None:
     with zenoh.open(foreign_config(town)) as session:
         queryable = session.declare_queryable(
             "b/asked", lambda query: query.reply("b/asked", b"{}", encoding="application/json")
         )
         expected = "'b/asked' has no known type; its samples are application/json"
-        assert_one_line(town.run("topic", "type", "b/asked"), 1, expected)
-        lines = town.run("topic", "info", "b/asked").stdout.splitlines()
+        assert_one_line(verb(town, "topic", "type", "b/asked"), 1, expected)
+        lines = verb(town, "topic", "info", "b/asked").stdout.splitlines()
         assert lines[:2] == ["Type: unknown", "Publisher count: 1"]
         assert lines[2].startswith("  anonymous, which answers queries  DATA  application/json  ")
         del queryable
 
 
-def test_a_search_for_a_foreign_node_calls_no_service(town: Wire) -> None:
+def test_a_search_for_a_foreign_node_calls_no_service(verb: Verb, town: Wire) -> None:
     asked: list[TriggerRequest] = []
 
     def answer(request: TriggerRequest) -> TriggerReply:
@@ -204,7 +206,7 @@ def test_a_search_for_a_foreign_node_calls_no_service(town: Wire) -> None:
         return TriggerReply(True, "")
 
     town.bus("sim").serve("stop", TriggerRequest, TriggerReply, answer).start()
-    assert_one_line(town.run("topic", "info", "stop"), 1, "unknown key 'stop'")
+    assert_one_line(verb(town, "topic", "info", "stop"), 1, "unknown key 'stop'")
     assert asked == []
 
 

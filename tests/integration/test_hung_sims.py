@@ -6,6 +6,7 @@ from holozen.testing import Process, Wire
 from holozen.testing.wire import command, free_port
 from holozen.transport.connection import Connection
 
+from .conftest import Verb
 from .robots import URDF
 
 BOT = URDF / "hb_bot.urdf.xacro"
@@ -21,10 +22,10 @@ def two_sims(wire: Wire) -> Process:
     return sim
 
 
-def test_what_is_said_to_all_sims_names_one_that_hangs_and_reaches_it_once_it_goes_on(wire: Wire) -> None:
+def test_what_is_said_to_all_sims_names_one_that_hangs_and_reaches_it_once_it_goes_on(verb: Verb, wire: Wire) -> None:
     hung = two_sims(wire)
-    assert sorted(wire.run("stop").stdout.splitlines()) == STOPPED  # so each is known to the other
-    assert wire.run("release").returncode == 0
+    assert sorted(verb(wire, "stop").stdout.splitlines()) == STOPPED  # so each is known to the other
+    assert verb(wire, "release").returncode == 0
     hung.signal(signal.SIGSTOP)
     said = {words: wire.start(*words) for words in SAYS}  # at once: after 10 s Zenoh gives a silent peer up
     bob, fred = wire.start("stop", "Bob"), wire.start("stop", "Fred")
@@ -36,19 +37,21 @@ def test_what_is_said_to_all_sims_names_one_that_hangs_and_reaches_it_once_it_go
     assert fred.wait() == 0, "the other one is not concerned"
     hung.signal(signal.SIGCONT)
     hung.wait_for_line("overrun")
-    assert sorted(wire.run("stop").stdout.splitlines()) == STOPPED
-    done = wire.run("sim", "pause")
+    assert sorted(verb(wire, "stop").stdout.splitlines()) == STOPPED
+    done = verb(wire, "sim", "pause")
     assert (done.returncode, done.stdout) == (0, "paused\n")
 
 
-def test_the_one_that_holds_the_first_meeting_point_is_named_by_the_holder_of_the_next() -> None:
+def test_the_one_that_holds_the_first_meeting_point_is_named_by_the_holder_of_the_next(
+    verb: Verb,
+) -> None:
     points = tuple(f"tcp/127.0.0.1:{free_port()}" for _ in range(2))
     with Wire() as wire:
         wire.flags = Connection(connect=points, listen=points).arguments()
         hung = wire.start("sim", "--robot", f"{BOT}=Fred")
         hung.wait_for_line("Fred listens on")
         wire.start("sim", "--join", "--robot", f"{BOT}=Bob").wait_for_line("Bob listens on")
-        assert sorted(wire.run("stop").stdout.splitlines()) == STOPPED  # so each is known to the other
+        assert sorted(verb(wire, "stop").stdout.splitlines()) == STOPPED  # so each is known to the other
         hung.signal(signal.SIGSTOP)
         said = {words: wire.start(*words) for words in (("stop",), ("list",))}
         for words, process in said.items():

@@ -11,6 +11,7 @@ from holozen.messages import Header, JointState, Time
 from holozen.testing import Wire, wait_for
 from holozen.transport.pubsub import Publisher
 
+from .conftest import Verb
 from .robots import URDF, Record, Robot, place, record, speeds
 
 JOINTS = ["jFL", "jFR", "jBL", "jBR"]
@@ -191,39 +192,41 @@ def test_a_wrong_command_moves_nothing_and_is_reported(rover: Rover, message: Jo
 
 
 @pytest.mark.parametrize("often", [("-t", "10", "-r", "20"), ("--once",)], ids=["times", "once"])
-def test_pub_reports_why_a_joint_command_moves_nothing(rover: Rover, town: Wire, often: tuple[str, ...]) -> None:
+def test_pub_reports_why_a_joint_command_moves_nothing(
+    verb: Verb, rover: Rover, town: Wire, often: tuple[str, ...]
+) -> None:
     expected = "not obeyed: there is no joint 'jXX'; the joints are jBL, jBR, jFL, jFR"
 
     def reported() -> bool:
         """False where a busy machine made a command too late, which is another reason."""
-        done = town.run("topic", "pub", "joint_command", "{name: [jXX], velocity: [1]}", *often)
+        done = verb(town, "topic", "pub", "joint_command", "{name: [jXX], velocity: [1]}", *often)
         assert done.returncode == 1, done.stderr
         return done.stderr.splitlines()[1:] == [expected]
 
     wait_for(reported)
 
 
-def test_pub_reports_nothing_of_a_joint_command_that_is_obeyed(rover: Rover, town: Wire) -> None:
+def test_pub_reports_nothing_of_a_joint_command_that_is_obeyed(verb: Verb, rover: Rover, town: Wire) -> None:
     def obeyed() -> bool:
         """False where a busy machine made a command too late, which is reported."""
-        done = town.run("topic", "pub", "joint_command", "{name: [jFL], velocity: [1]}", "-t", "10", "-r", "20")
+        done = verb(town, "topic", "pub", "joint_command", "{name: [jFL], velocity: [1]}", "-t", "10", "-r", "20")
         return (done.returncode, "obeyed" in done.stderr) == (0, False)
 
     wait_for(obeyed)
 
 
-def test_pub_reports_that_a_stopped_robot_does_not_move_its_joints(rover: Rover, town: Wire) -> None:
-    assert town.run("stop").returncode == 0
+def test_pub_reports_that_a_stopped_robot_does_not_move_its_joints(verb: Verb, rover: Rover, town: Wire) -> None:
+    assert verb(town, "stop").returncode == 0
     try:
-        done = town.run("topic", "pub", "joint_command", "{name: [jFL], velocity: [1]}", "--once")
+        done = verb(town, "topic", "pub", "joint_command", "{name: [jFL], velocity: [1]}", "--once")
     finally:
-        assert town.run("release").returncode == 0
+        assert verb(town, "release").returncode == 0
     assert (done.returncode, "has set the software stop" in done.stderr) == (1, True)
 
 
-def test_the_wheels_of_what_balances_take_no_commands(rover: Rover, town: Wire) -> None:
+def test_the_wheels_of_what_balances_take_no_commands(verb: Verb, rover: Rover, town: Wire) -> None:
     bus = town.bus()
-    assert town.run("spawn", str(URDF / "wheely_boi.xacro"), "--name", "Fred", "-y", "5").returncode == 0
+    assert verb(town, "spawn", str(URDF / "wheely_boi.xacro"), "--name", "Fred", "-y", "5").returncode == 0
     fred, commands = Robot(bus, "Fred"), bus.publisher("Fred/joint_command", JointState)
 
     def refused() -> bool:

@@ -1,7 +1,6 @@
 """Keys in a pseudo-terminal become commands on the wire, and the robot moves."""
 
 import contextlib
-import subprocess
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -9,6 +8,7 @@ import pytest
 from holozen.messages import TwistStamped
 from holozen.testing import Terminal, Wire, wait_for
 
+from .conftest import Verb
 from .robots import URDF, Record, Robot, distance, moves, place, planar, rests, time_of
 
 V, W = 0.4, 0.8  # m/s, rad/s
@@ -188,9 +188,7 @@ def test_the_teleop_shows_what_a_robot_cannot_do_and_the_limits_that_the_sim_has
     wait_for(lambda: "cannot strafe" not in terminal.screen())
 
 
-def test_a_robot_has_one_name_in_list_map_teleop_and_doctor(
-    town: Wire, robot: Robot, verb: Callable[..., subprocess.CompletedProcess[str]]
-) -> None:
+def test_a_robot_has_one_name_in_list_map_teleop_and_doctor(town: Wire, robot: Robot, verb: Verb) -> None:
     with start_teleop(town) as terminal:
         terminal.wait_for_text("holozen teleop   hb_bot")
     assert verb(town, "list").stdout.startswith("hb_bot ")

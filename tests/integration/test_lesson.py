@@ -17,12 +17,12 @@ from holozen.ros.generated import find
 from holozen.testing import Process, Terminal, Wire, wait_for
 from holozen.testing.wire import command
 
+from .conftest import Verb
 from .robots import Robot, moves, place, record, rests
 
 LESSON = Path(__file__).parents[2] / "examples" / "lesson"
 SCRIPTS = LESSON / "hb_control" / "scripts"
 TURN = 1.0  # rad/s, the default of teleop_keys
-Verb = Callable[..., subprocess.CompletedProcess[str]]
 ROS = {"rclpy", "geometry_msgs", "std_msgs", "nav_msgs", "tf2_ros", "tf_transformations", "launch"}
 
 

@@ -4,7 +4,6 @@ import hashlib
 import math
 import re
 import signal
-import subprocess
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -42,6 +41,8 @@ from holozen.testing import LockStep, Wire, wait_for
 from holozen.transport.errors import ServiceError
 from holozen.transport.pubsub import Subscription
 
+from .conftest import Verb
+
 Sim = Callable[..., LockStep]
 LIBRARIES = {"pybullet": "/pybullet.", "mujoco": "/libmujoco."}  # files of the engines
 WORLD = ("--world", str(find("worlds", "arena.world")))
@@ -54,6 +55,20 @@ ROBOTS = tuple(
     for file, name in (("hb_bot.urdf.xacro", "Planar"), ("rover.urdf.xacro", "Skid"), ("wheely_boi.xacro", "Balance"))
     for word in ("--robot", f"{find('urdf', file)}={name}")
 )
+
+
+@pytest.fixture(scope="module")
+def only_sim(town: Wire) -> LockStep:
+    return LockStep(town)
+
+
+@pytest.fixture
+def sim(only_sim: LockStep) -> LockStep:
+    """The file's sim, paused, with hb_bot at its start."""
+    set_state(only_sim, State.STATE_PAUSED)
+    only_sim.status = status_of(only_sim)  # others may have reset it
+    only_sim.reset()
+    return only_sim
 
 
 def hash_of_poses(bus: Bus) -> str:
@@ -94,8 +109,7 @@ def test_the_same_commands_at_the_same_steps_move_all_to_the_same_bits(
     assert len(hashes) == 1
 
 
-def test_a_reply_follows_all_messages_of_its_steps_and_the_state_after_the_last(lock_step: Sim) -> None:
-    sim = lock_step()
+def test_a_reply_follows_all_messages_of_its_steps_and_the_state_after_the_last(sim: LockStep) -> None:
     odom = sim.bus.subscribe("odom", Odometry, depth=1000)
     clock = sim.bus.subscribe("clock", Clock, depth=1000)
     wanted: dict[str, Subscription[Any]] = {"odom": odom, "clock": clock}
@@ -109,8 +123,7 @@ def test_a_reply_follows_all_messages_of_its_steps_and_the_state_after_the_last(
         time += steps / 240
 
 
-def test_while_it_is_paused_odom_goes_on_and_nothing_moves_then_or_later(lock_step: Sim) -> None:
-    sim = lock_step()
+def test_while_it_is_paused_odom_goes_on_and_nothing_moves_then_or_later(sim: LockStep) -> None:
     start = sim.step(120)
     sim.drive(x=0.4)
     odom = sim.bus.subscribe("odom", Odometry, depth=1000)
@@ -129,8 +142,7 @@ def test_while_it_is_paused_odom_goes_on_and_nothing_moves_then_or_later(lock_st
     wait_for(moves)
 
 
-def test_stops_hold_while_it_is_paused_and_survive_a_reset(lock_step: Sim) -> None:
-    sim = lock_step()
+def test_stops_hold_while_it_is_paused_and_survive_a_reset(sim: LockStep) -> None:
     sim.drive(x=0.4)
     moved = sim.step(60)
     sim.bus.call("stop", TriggerRequest(), TriggerReply)
@@ -149,14 +161,14 @@ def test_stops_hold_while_it_is_paused_and_survive_a_reset(lock_step: Sim) -> No
     assert sim.step(60).twist.twist.linear.x == pytest.approx(0.4, abs=1e-3)
 
 
-def test_a_reset_moves_nothing_and_its_readers_see_the_next_epoch(lock_step: Sim) -> None:
-    sim = lock_step()
+def test_a_reset_moves_nothing_and_its_readers_see_the_next_epoch(sim: LockStep) -> None:
     odom = sim.bus.subscribe("odom", Odometry, depth=1000)
     sim.drive(x=0.4)
     sim.step(60)
-    assert (sim.status.epoch, sim.status.steps) == (0, 60)
+    before = sim.status
+    assert before.steps == 60
     first = sim.reset()
-    assert (sim.status.epoch, sim.status.steps, sim.status.time) == (1, 0, 0.0)
+    assert (sim.status.epoch, sim.status.steps, sim.status.time) == (before.epoch + 1, 0, 0.0)
     assert stamp_of(all_of(odom)[-1]) == 0
     assert sim.step(60).pose.pose.position.x == pytest.approx(first.pose.pose.position.x, abs=1e-4)
     sim.drive(x=0.4)
@@ -234,12 +246,9 @@ def test_what_cannot_be_done_is_refused_with_its_result(lock_step: Sim) -> None:
     assert sim.process.wait() == 0
 
 
-def test_the_command_line_pauses_plays_steps_and_resets(
-    lock_step: Sim, wire: Wire, verb: Callable[..., subprocess.CompletedProcess[str]]
-) -> None:
-    sim = lock_step()
+def test_the_command_line_pauses_plays_steps_and_resets(sim: LockStep, town: Wire, verb: Verb) -> None:
     words = ("pause", "step 24", "reset --scope time", "step 12 --json", "reset --json", "play", "play --json")
-    reported = [verb(wire, "sim", *word.split()) for word in words]
+    reported = [verb(town, "sim", *word.split()) for word in words]
     assert [done.returncode for done in reported] == [0] * len(words)
     assert [done.stdout for done in reported] == [
         "paused\n", "made 24 steps\n", "reset: time\n", '{"steps": 12}\n', '{"scope": ["all"]}\n', "playing\n",
@@ -255,11 +264,10 @@ def test_a_robot_that_is_not_in_the_sim_is_named(lock_step: Sim, monkeypatch: py
         lock_step(robot="Fred")
 
 
-def test_steps_end_with_ctrl_c_and_with_their_timeout(lock_step: Sim, wire: Wire) -> None:
-    sim = lock_step()
-    interrupted = wire.start("sim", "step", "10000000")
+def test_steps_end_with_ctrl_c_and_with_their_timeout(verb: Verb, sim: LockStep, town: Wire) -> None:
+    interrupted = town.start("sim", "step", "10000000")
     wait_for(lambda: steps_of(sim))
-    beside = wire.run("sim", "step")
+    beside = verb(town, "sim", "step")
     assert (beside.returncode, beside.stderr) == (1, "holozen sim: other steps are being made\n")
     assert interrupted.returncode is None, "whose steps go on"
     interrupted.signal(signal.SIGINT)
@@ -268,7 +276,7 @@ def test_steps_end_with_ctrl_c_and_with_their_timeout(lock_step: Sim, wire: Wire
         r"holozen sim step: interrupted: the goal was cancelled, \d+ steps before the last one\n", interrupted.err
     )
     stands(sim)
-    late = wire.run("sim", "step", "10000000", "--timeout", "0.2")
+    late = verb(town, "sim", "step", "10000000", "--timeout", "0.2")
     assert late.returncode == 1
     assert re.fullmatch(
         r"holozen sim: not done within 0.2 s, and ended: the goal was cancelled, \d+ steps before the last one; "
@@ -288,7 +296,11 @@ def stands(sim: LockStep) -> None:
 
 def steps_of(sim: LockStep) -> int:
     """How many steps there were, by what the sim published last."""
-    return sim.bus.call("simulation_status", TriggerRequest(), SimulationStatus).steps
+    return status_of(sim).steps
+
+
+def status_of(sim: LockStep) -> SimulationStatus:
+    return sim.bus.call("simulation_status", TriggerRequest(), SimulationStatus)
 
 
 def set_state(sim: LockStep, state: int) -> int:

@@ -62,12 +62,9 @@ def test_nothing_listens_beyond_loopback_and_no_multicast_is_joined(network: Hos
         for name in ("tcp6", "udp", "udp6"):
             assert sockets(network, name) == []
         assert groups(network) == before
+        assert network.run(*command("topic", "echo", "odom", "--once", "--timeout", "20")).returncode == 0
+        assert {address for address, *_ in sockets(network, "tcp")} == {LOOPBACK}, "those of connections too"
         assert up.returncode is None
-
-
-def test_no_socket_at_all_has_an_address_of_the_network(network: Host, up: Process) -> None:
-    assert network.run(*command("topic", "echo", "odom", "--once", "--timeout", "20")).returncode == 0
-    assert {address for address, *_ in sockets(network, "tcp")} == {LOOPBACK}
 
 
 def test_the_commands_of_the_readme_work_as_they_stand(network: Host, up: Process) -> None:
@@ -89,18 +86,13 @@ def test_the_commands_of_the_readme_work_as_they_stand(network: Host, up: Proces
     up.wait_for_line("controller: continues")
 
 
-def test_a_router_listens_on_loopback_only_too(network: Host) -> None:
+def test_a_router_listens_on_loopback_only_too_and_peers_go_on_while_it_takes_the_port_first(network: Host) -> None:
     with Process(network.inside(*command("router"))) as router:
         router.wait_for_line("router: listens at tcp/127.0.0.1:7447")
         listeners = [(address, port) for address, port, state in sockets(network, "tcp") if state == LISTENS]
         assert listeners == [(LOOPBACK, 7447)]
         for name in ("tcp6", "udp", "udp6"):
             assert sockets(network, name) == []
-
-
-def test_peers_go_on_while_a_router_takes_the_port_first(network: Host) -> None:
-    with Process(network.inside(*command("router"))) as router:
-        router.wait_for_line("listens at")
         with Process(network.inside(*command("sim"))) as sim:
             sim.wait_for_line("listens on")
             echo = command("topic", "echo", "odom", "--once", "--timeout", "10")

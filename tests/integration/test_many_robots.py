@@ -9,7 +9,7 @@ from holozen import data
 from holozen.messages import JointState, TFMessage
 from holozen.testing import Wire, wait_for
 
-from .conftest import start_sim
+from .conftest import Verb, start_sim
 from .processes import assert_one_line
 from .robots import Robot, distance, moves, place, record
 
@@ -68,9 +68,9 @@ def test_their_frames_carry_their_names(fred: Robot, ann: Robot) -> None:
     assert record(fred.bus, "Fred/joint_states", JointState).next().name
 
 
-def test_there_is_no_robot_at_the_root(town: Wire, fred: Robot) -> None:
-    assert town.run("topic", "info", "cmd_vel").returncode == 1
-    info = town.run("topic", "info", "Fred/cmd_vel").stdout
+def test_there_is_no_robot_at_the_root(verb: Verb, town: Wire, fred: Robot) -> None:
+    assert verb(town, "topic", "info", "cmd_vel").returncode == 1
+    info = verb(town, "topic", "info", "Fred/cmd_vel").stdout
     assert "Type: geometry_msgs/msg/Twist\n" in info
     assert "  sim (" in info
 
@@ -94,10 +94,10 @@ def test_a_teleop_with_a_name_drives_that_robot(town: Wire, fred: Robot, ann: Ro
         assert commands.messages() == []
 
 
-def test_a_wildcard_is_no_robots_name(town: Wire) -> None:
+def test_a_wildcard_is_no_robots_name(verb: Verb, town: Wire) -> None:
     """Zenoh would take it, and it would drive them all."""
-    for verb in ("teleop", "controller"):
-        done = town.run(verb, "*")
+    for service in ("teleop", "controller"):
+        done = verb(town, service, "*")
         assert done.returncode == 2
         assert "robot name '*': use a letter, then" in done.stderr
 
@@ -117,12 +117,14 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_a_sim_that_cannot_start_gives_the_reason_in_one_line(wire: Wire, tmp_path: Path, name: str) -> None:
+def test_a_sim_that_cannot_start_gives_the_reason_in_one_line(
+    verb: Verb, wire: Wire, tmp_path: Path, name: str
+) -> None:
     words, code, reason = WRONG[name]
     (tmp_path / "broken.urdf").write_text(BROKEN_XML)
     (tmp_path / "still.urdf").write_text(NO_DRIVE)
     names = {"tmp": tmp_path, "bot": BOT, "picture": data.find("meshes", "logo.png")}
-    done = wire.run("sim", *(word.format(**names) for word in words))
+    done = verb(wire, "sim", *(word.format(**names) for word in words))
     assert done.returncode == code
     assert done.stdout == ""
     lines = done.stderr.splitlines()
@@ -130,7 +132,9 @@ def test_a_sim_that_cannot_start_gives_the_reason_in_one_line(wire: Wire, tmp_pa
     assert reason.format(**names) in lines[0]
 
 
-def test_a_second_sim_only_joins_with_named_robots_and_then_both_are_one_world_to_callers(wire: Wire) -> None:
+def test_a_second_sim_only_joins_with_named_robots_and_then_both_are_one_world_to_callers(
+    verb: Verb, wire: Wire
+) -> None:
     first = start_sim(wire, "--robot", f"{BOT}=Fred")
     for words, why in [
         ([], "end it, or join it with named robots: holozen sim --join --robot FILE=NAME"),
@@ -138,16 +142,16 @@ def test_a_second_sim_only_joins_with_named_robots_and_then_both_are_one_world_t
         (["--join"], "name the robots: holozen sim --join --robot FILE=NAME"),
         (["--join", "--robot", f"{BOT}=Ann", "--robot", str(BOT)], "name the robots: "),
     ]:
-        done = wire.run("sim", *words)
+        done = verb(wire, "sim", *words)
         assert_one_line(done, 1, "sim: sim@", f" simulates here already; {why}")
     second = start_sim(wire, "--join", "--robot", f"{BOT}=Ann")
-    assert [line.split()[0] for line in wire.run("list").stdout.splitlines()] == ["Ann", "Fred"]
-    clock = json.loads(wire.run("topic", "info", "clock", "--json").stdout)
+    assert [line.split()[0] for line in verb(wire, "list").stdout.splitlines()] == ["Ann", "Fred"]
+    clock = json.loads(verb(wire, "topic", "info", "clock", "--json").stdout)
     assert len(clock["publishers"]) == 1
-    assert "duplicates" not in wire.run("doctor").stdout
+    assert "duplicates" not in verb(wire, "doctor").stdout
     Robot(wire.bus(), "Ann").drive(0.3)
-    assert wire.run("param", "set", "Ann/sim", "max_linear", "0.2").returncode == 0
-    assert wire.run("delete", "Ann", "Fred").returncode == 0
-    assert wire.run("list").stdout == ""
-    assert wire.run("spawn", str(BOT), "--name", "Joe").returncode == 0, "one of them spawns"
+    assert verb(wire, "param", "set", "Ann/sim", "max_linear", "0.2").returncode == 0
+    assert verb(wire, "delete", "Ann", "Fred").returncode == 0
+    assert verb(wire, "list").stdout == ""
+    assert verb(wire, "spawn", str(BOT), "--name", "Joe").returncode == 0, "one of them spawns"
     assert "Traceback" not in first.err + second.err

@@ -16,6 +16,7 @@ from holozen.messages import rcl_interfaces as r
 from holozen.testing import LockStep, Process, Wire, wait_for
 from holozen.transport.pubsub import Subscription
 
+from .conftest import Verb
 from .robots import Robot, moves, rests, time_of
 
 DEFAULTS = {
@@ -120,14 +121,14 @@ def test_simulated_time_goes_at_the_pace_that_is_set(robot: Robot) -> None:
     wait_for(lambda: time_of(robot.newest()) - after > 2 * (time.monotonic() - ended), within=30)
 
 
-def test_a_robot_with_a_name_has_its_own(town: Wire, robot: Robot) -> None:
-    assert town.run("spawn", "urdf/hb_bot.urdf.xacro", "--name", "Fred", "-x", "3").returncode == 0
+def test_a_robot_with_a_name_has_its_own(verb: Verb, town: Wire, robot: Robot) -> None:
+    assert verb(town, "spawn", "urdf/hb_bot.urdf.xacro", "--name", "Fred", "-x", "3").returncode == 0
     try:
         assert put(robot.bus, "sim", **{"Fred.command_timeout": 1.0}) == []
         names = robot.bus.call("sim/list_parameters", r.ListParametersRequest(), r.ListParametersReply).result.names
         assert {"Fred.command_timeout", "Fred.odometry_rate", "command_timeout"} <= set(names)
     finally:
-        assert town.run("delete", "Fred").returncode == 0
+        assert verb(town, "delete", "Fred").returncode == 0
     assert put(robot.bus, "sim", **{"Fred.command_timeout": 1.0}) == [
         "sim has no parameter 'Fred.command_timeout' (did you mean 'command_timeout'?)"
     ]
@@ -173,18 +174,20 @@ def test_the_pose_service_hands_out_another_shape_at_once(wire: Wire) -> None:
     assert bus.call("next_goal", NextGoalRequest(5), NextGoalReply).end_of_list == 1
 
 
-@pytest.mark.parametrize(("verb", "node"), [("pose-service", "pose_service"), ("controller", "controller")])
-def test_the_second_of_a_kind_names_the_first_and_a_hung_one_is_named(wire: Wire, verb: str, node: str) -> None:
+@pytest.mark.parametrize(("service", "node"), [("pose-service", "pose_service"), ("controller", "controller")])
+def test_the_second_of_a_kind_names_the_first_and_a_hung_one_is_named(
+    verb: Verb, wire: Wire, service: str, node: str
+) -> None:
     wire.start("sim", "--empty").wait_for_line("no robot yet")  # it knows of a node that hangs
-    first = wire.start(verb)
-    wait_for(lambda: node in wire.run("param", "list").stdout)
-    second = wire.start(verb)
+    first = wire.start(service)
+    wait_for(lambda: node in verb(wire, "param", "list").stdout)
+    second = wire.start(service)
     second.wait_for_line(f"{node}: {node}@")
     assert "does the same already; end one of the two\n" in second.err
     second.terminate()
     second.wait()
     first.signal(signal.SIGSTOP)
-    done = wire.run("param", "list", node)
+    done = verb(wire, "param", "list", node)
     first.signal(signal.SIGCONT)
     assert done.returncode == 1
     assert f"{node}@" in done.stderr

@@ -7,6 +7,8 @@ from holozen.bus import Bus
 from holozen.messages import rcl_interfaces as r
 from holozen.testing import Wire
 
+from .conftest import Verb
+
 PAGE = Path(__file__).parents[2] / "docs" / "parameters.md"
 
 
@@ -28,17 +30,13 @@ def _row(node: str, one: r.ParameterDescriptor) -> str:
     return f"| `{node}` | `{one.name}` | {takes} | {about} |"
 
 
-def test_the_table_is_current(wire: Wire) -> None:
-    wire.start("sim")
+def test_the_table_is_current_and_the_call_of_the_page_works(verb: Verb, wire: Wire) -> None:
+    wire.start("sim").wait_for_line("listens on")
     wire.start("controller")
     wire.start("pose-service")
     bus = wire.bus()
     shown = re.search(r"\|---\|---\|---\|---\|\n(.*?)\n<!-- /parameters -->", PAGE.read_text(), re.DOTALL)
     assert shown
     assert shown[1].splitlines() == [row for node in ("sim", "controller", "pose_service") for row in rows(bus, node)]
-
-
-def test_the_call_of_the_page_works(wire: Wire) -> None:
-    wire.start("sim").wait_for_line("listens on")
-    done = wire.run("service", "call", "sim/get_parameters", '{"names": ["max_linear"]}', "--json")
+    done = verb(wire, "service", "call", "sim/get_parameters", '{"names": ["max_linear"]}', "--json")
     assert (done.returncode, '"double_value": 5.0' in done.stdout) == (0, True), done.stderr

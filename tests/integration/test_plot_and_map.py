@@ -14,20 +14,21 @@ from holozen.rotation import from_rpy
 from holozen.testing import Terminal, Wire, wait_for
 from holozen.testing.wire import command
 
+from .conftest import Verb
 from .robots import URDF, Robot
 
 FIELD = "odom.pose.pose.position.x"
 
 
-def test_one_picture_of_live_numbers_fits_the_smallest_terminal(town: Wire, robot: Robot) -> None:
-    done = town.run("plot", FIELD, "odom.twist.twist.linear.x", "--once", "-w", "0.5")
+def test_one_picture_of_live_numbers_fits_the_smallest_terminal(verb: Verb, town: Wire, robot: Robot) -> None:
+    done = verb(town, "plot", FIELD, "odom.twist.twist.linear.x", "--once", "-w", "0.5")
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert len(lines) == 24
     assert all(len(line) <= 80 for line in lines)
     assert lines[0].startswith(f"{FIELD}: ")
     assert lines[-1].split()[-1] == "now"
-    done = town.run("plot", FIELD, "--once", "-w", "0.5", "--ascii")
+    done = verb(town, "plot", FIELD, "--once", "-w", "0.5", "--ascii")
     assert done.stdout.isascii()
 
 
@@ -38,11 +39,11 @@ def test_numbers_come_as_json_until_the_reader_has_enough(town: Wire, robot: Rob
     assert [list(json.loads(line)) for line in done.stdout.splitlines()] == [["time", FIELD]] * 2
 
 
-def test_numbers_of_one_window_come_as_json_and_end(town: Wire, robot: Robot) -> None:
-    done = town.run("plot", FIELD, "--json", "--once", "-w", "0.5")
+def test_numbers_of_one_window_come_as_json_and_end(verb: Verb, town: Wire, robot: Robot) -> None:
+    done = verb(town, "plot", FIELD, "--json", "--once", "-w", "0.5")
     assert done.returncode == 0, done.stderr
     assert {FIELD, "time"} == set(json.loads(done.stdout.splitlines()[-1]))
-    done = town.run("plot", "nobody.x", "--json", "--once", "-w", "0.2")
+    done = verb(town, "plot", "nobody.x", "--json", "--once", "-w", "0.2")
     assert (done.returncode, done.stdout) == (1, "")
     assert "no messages" in done.stderr
 
@@ -95,9 +96,9 @@ def test_a_terminal_is_left_as_it_was(town: Wire, robot: Robot) -> None:
     ],
 )
 def test_an_error_is_reported_in_one_line(
-    town: Wire, robot: Robot, words: tuple[str, ...], code: int, part: str
+    verb: Verb, town: Wire, robot: Robot, words: tuple[str, ...], code: int, part: str
 ) -> None:
-    done = town.run("plot", *words)
+    done = verb(town, "plot", *words)
     assert done.returncode == code, done.stderr
     assert part in done.stderr.splitlines()[-1]
     assert "Traceback" not in done.stderr
@@ -115,10 +116,10 @@ def test_what_is_no_message_is_counted(wire: Wire) -> None:
     assert "2 messages could not be read" in plot.err
 
 
-def test_the_map_shows_the_robot_and_the_goals(town: Wire, robot: Robot) -> None:
+def test_the_map_shows_the_robot_and_the_goals(verb: Verb, town: Wire, robot: Robot) -> None:
     service = town.start("pose-service")
     service.wait_for_line("4 goals")
-    done = town.run("map", "--once")
+    done = verb(town, "map", "--once")
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert len(lines) == 24
@@ -126,7 +127,7 @@ def test_the_map_shows_the_robot_and_the_goals(town: Wire, robot: Robot) -> None
     assert "hb_bot x" in lines[-1]
 
     def goals() -> int:
-        output = json.loads(town.run("map", "--json").stdout)
+        output = json.loads(verb(town, "map", "--json").stdout)
         assert [one["name"] for one in output["robots"]] == ["hb_bot"]
         assert output["objects"] == {}
         return len(output["goals"])
@@ -134,7 +135,7 @@ def test_the_map_shows_the_robot_and_the_goals(town: Wire, robot: Robot) -> None
     wait_for(lambda: goals() == 4, what="the four corners of the square")
 
 
-def test_the_map_shows_what_a_lidar_sees_where_it_is(wire: Wire) -> None:
+def test_the_map_shows_what_a_lidar_sees_where_it_is(verb: Verb, wire: Wire) -> None:
     """The arena's walls are 5 m from its middle, whichever way the robot looks."""
     sim = wire.start(
         "sim", "--robot", str(URDF / "explorer.urdf.xacro"), "--world", str(URDF.parent / "worlds/arena.world")
@@ -145,7 +146,7 @@ def test_the_map_shows_what_a_lidar_sees_where_it_is(wire: Wire) -> None:
     wire.bus().call("set_entity_state", request, SetEntityStateReply)
 
     def walls() -> bool:
-        output = json.loads(wire.run("map", "--json").stdout)
+        output = json.loads(verb(wire, "map", "--json").stdout)
         (robot,), seen = output["robots"], output["seen"]
         at = [max(abs(x), abs(y)) for x, y in seen]
         return abs(robot["yaw"] - 0.8) < 0.05 and len(at) > 100 and max(at) < 5.1 and sum(far > 4.9 for far in at) > 100

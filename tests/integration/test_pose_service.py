@@ -13,7 +13,7 @@ from holozen.messages import GetPoseReply, GetPoseRequest, NextGoalReply, NextGo
 from holozen.testing import Wire, wait_for
 from holozen.transport.errors import ServiceError
 
-from .conftest import foreign_config, start_sim
+from .conftest import Verb, foreign_config, start_sim
 from .robots import Robot, place, time_of
 
 HALF = math.sqrt(3) / 2
@@ -119,10 +119,10 @@ def test_goals_from_a_file_are_handed_out_as_they_stand(wire: Wire, tmp_path: Pa
     ],
 )
 def test_a_file_of_goals_that_is_wrong_is_named_with_its_line(
-    town: Wire, tmp_path: Path, content: bytes, reason: str
+    verb: Verb, town: Wire, tmp_path: Path, content: bytes, reason: str
 ) -> None:
     (tmp_path / "goals.txt").write_bytes(content)
-    done = town.run("pose-service", "--goals", str(tmp_path / "goals.txt"))
+    done = verb(town, "pose-service", "--goals", str(tmp_path / "goals.txt"))
     assert done.returncode == 1
     assert done.stderr.count("\n") == 1
     assert reason in done.stderr
@@ -135,8 +135,8 @@ def test_a_file_of_goals_that_is_wrong_is_named_with_its_line(
         (["--size", "0"], 2, "'0': use a number from 0.01 to 1000 m"),
     ],
 )
-def test_a_wrong_flag_is_one_error_line(town: Wire, words: list[str], code: int, reason: str) -> None:
-    done = town.run("pose-service", *words)
+def test_a_wrong_flag_is_one_error_line(verb: Verb, town: Wire, words: list[str], code: int, reason: str) -> None:
+    done = verb(town, "pose-service", *words)
     assert done.returncode == code
     assert reason in done.stderr.splitlines()[-1]
     assert "Traceback" not in done.stderr

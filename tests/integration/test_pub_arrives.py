@@ -12,6 +12,7 @@ from holozen.messages import CommandStatus, JointState, Message, PoseStamped, Tw
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 
+from .conftest import Verb
 from .processes import assert_one_line
 from .robots import Robot, moves, record
 
@@ -22,26 +23,26 @@ def still(*joints: str) -> JointState:
     return JointState(name=[*joints], velocity=[0.0] * len(joints))
 
 
-def test_it_reports_the_number_of_subscribers(town: Wire, robot: Robot) -> None:
+def test_it_reports_the_number_of_subscribers(verb: Verb, town: Wire, robot: Robot) -> None:
     """The sim, and the test that listens to commands."""
 
     def reported() -> bool:
-        done = town.run("topic", "pub", "cmd_vel", AHEAD, "--once")
+        done = verb(town, "topic", "pub", "cmd_vel", AHEAD, "--once")
         return (done.returncode, done.stdout, done.stderr) == (0, "", "2 subscribers of cmd_vel\n")
 
     wait_for(reported)  # a busy machine may discover one of them late, or make a single command too old
-    output = json.loads(town.run("topic", "pub", "cmd_vel", "{}", "-t", "2", "-w", "2", "--json").stdout)
+    output = json.loads(verb(town, "topic", "pub", "cmd_vel", "{}", "-t", "2", "-w", "2", "--json").stdout)
     assert output == {"key": "cmd_vel", "type": "geometry_msgs/msg/Twist", "subscribers": 2, "published": 2}
 
 
-def test_a_goal_that_is_only_looked_at_is_reported(wire: Wire) -> None:
+def test_a_goal_that_is_only_looked_at_is_reported(verb: Verb, wire: Wire) -> None:
     wire.start("topic", "echo", "Fred/goal_pose")
-    done = wire.run("topic", "pub", "Fred/goal_pose", "{}", "--once")
+    done = verb(wire, "topic", "pub", "Fred/goal_pose", "{}", "--once")
     assert (done.returncode, done.stdout) == (1, "")
     why = "no controller reads it, only topic_echo; `holozen controller Fred --laps 0` drives there"
     assert done.stderr == f"1 subscriber of Fred/goal_pose\nFred/goal_pose: {why}\n"
     goals = wire.bus("mine").subscribe("Fred/goal_pose", PoseStamped)
-    done = wire.run("topic", "pub", "Fred/goal_pose", "{}", "--once", "-w", "2")
+    done = verb(wire, "topic", "pub", "Fred/goal_pose", "{}", "--once", "-w", "2")
     assert done.returncode == 0 and done.stderr.endswith("2 subscribers of Fred/goal_pose\n")
     assert goals.recv().message == PoseStamped()
 
@@ -54,21 +55,21 @@ def test_it_waits_for_as_many_subscribers_as_requested(town: Wire, robot: Robot)
     assert other.recv().message == Twist.planar(0.2)
 
 
-def test_it_gives_up_waiting_when_asked(town: Wire) -> None:
-    done = town.run("topic", "pub", "nobody", "geometry_msgs/msg/Twist", AHEAD, "-1", "-w", "1", "--max-wait", "0.1")
+def test_it_gives_up_waiting_when_asked(verb: Verb, town: Wire) -> None:
+    done = verb(town, "topic", "pub", "nobody", "geometry_msgs/msg/Twist", AHEAD, "-1", "-w", "1", "--max-wait", "0.1")
     assert done.returncode == 1
     assert done.stderr.startswith("holozen topic pub: no subscribers of nobody")
 
 
-def test_fewer_subscribers_than_requested_are_not_enough(town: Wire, robot: Robot) -> None:
-    done = town.run("topic", "pub", "cmd_vel", "{}", "-1", "-w", "9", "--max-wait", "0.2")
+def test_fewer_subscribers_than_requested_are_not_enough(verb: Verb, town: Wire, robot: Robot) -> None:
+    done = verb(town, "topic", "pub", "cmd_vel", "{}", "-1", "-w", "9", "--max-wait", "0.2")
     assert done.returncode == 1
     assert "cmd_vel: 9 subscribers did not come in time, so nothing is published" in done.stderr
 
 
-def test_it_needs_no_subscriber_where_it_does_not_wait(town: Wire) -> None:
+def test_it_needs_no_subscriber_where_it_does_not_wait(verb: Verb, town: Wire) -> None:
     for flags in (("--no-wait",), ("-w", "0")):
-        done = town.run("topic", "pub", "nobody", "geometry_msgs/msg/Twist", AHEAD, "--once", *flags)
+        done = verb(town, "topic", "pub", "nobody", "geometry_msgs/msg/Twist", AHEAD, "--once", *flags)
         assert (done.returncode, done.stderr) == (0, "")
 
 
@@ -81,8 +82,8 @@ def test_it_needs_no_subscriber_where_it_does_not_wait(town: Wire) -> None:
         ("linear: {x: .inf}", "linear.x is not a finite number; --force sends it all the same"),
     ],
 )
-def test_a_wrong_field_is_refused_with_the_closest_name(town: Wire, value: str, expected: str) -> None:
-    assert_one_line(town.run("topic", "pub", "cmd_vel", value, "--once"), 1, "refused: ", expected)
+def test_a_wrong_field_is_refused_with_the_closest_name(verb: Verb, town: Wire, value: str, expected: str) -> None:
+    assert_one_line(verb(town, "topic", "pub", "cmd_vel", value, "--once"), 1, "refused: ", expected)
 
 
 @pytest.mark.parametrize(
@@ -93,21 +94,23 @@ def test_a_wrong_field_is_refused_with_the_closest_name(town: Wire, value: str, 
         ("joint_command", "{name: [j], velocity: [2e3]}", "velocity[0] of joint 'j' is 2000; at most 1000"),
     ],
 )
-def test_what_no_robot_can_mean_is_refused_and_not_sent(wire: Wire, key: str, value: str, expected: str) -> None:
+def test_what_no_robot_can_mean_is_refused_and_not_sent(
+    verb: Verb, wire: Wire, key: str, value: str, expected: str
+) -> None:
     heard = wire.bus().subscribe_raw(key)
     often = ("--once",) if key != "cmd_vel" else ("-r", "20")
-    done = wire.run("topic", "pub", key, value, *often)
+    done = verb(wire, "topic", "pub", key, value, *often)
     assert_one_line(done, 1, f"{key}: refused: {expected}; --force sends it all the same")
     assert heard.try_recv() is None
 
 
-def test_a_type_that_the_key_does_not_carry_is_refused(town: Wire) -> None:
+def test_a_type_that_the_key_does_not_carry_is_refused(verb: Verb, town: Wire) -> None:
     words = ("topic", "pub", "cmd_vel", "nav_msgs/msg/Odometry", "{}", "--once", "--no-wait")
     expected = (
         "cmd_vel: its type is geometry_msgs/msg/Twist or geometry_msgs/msg/TwistStamped, not nav_msgs/msg/Odometry"
     )
-    assert_one_line(town.run(*words), 1, expected)
-    assert town.run(*words, "--force").returncode == 0
+    assert_one_line(verb(town, *words), 1, expected)
+    assert verb(town, *words, "--force").returncode == 0
 
 
 @pytest.mark.parametrize("wire_name", ["json", "msgpack"])
@@ -120,18 +123,18 @@ def test_force_sends_what_the_sim_then_refuses_and_reports_it(town: Wire, robot:
     robot.stands()
 
 
-def test_to_a_stopped_robot_it_fails_and_says_so(town: Wire, robot: Robot) -> None:
-    assert town.run("stop").returncode == 0
+def test_to_a_stopped_robot_it_fails_and_says_so(verb: Verb, town: Wire, robot: Robot) -> None:
+    assert verb(town, "stop").returncode == 0
     try:
-        ended = [town.run("topic", "pub", "cmd_vel", *often, AHEAD) for often in (["--once"], ["-t", "2"])]
+        ended = [verb(town, "topic", "pub", "cmd_vel", *often, AHEAD) for often in (["--once"], ["-t", "2"])]
     finally:
-        assert town.run("release").returncode == 0
+        assert verb(town, "release").returncode == 0
     for done in ended:
         assert done.returncode == 1
         assert "not obeyed: stop@" in done.stderr and "has set the software stop" in done.stderr
 
 
-def test_of_a_paused_sim_it_says_so_instead_of_to_try_again(town: Wire, robot: Robot) -> None:
+def test_of_a_paused_sim_it_says_so_instead_of_to_try_again(verb: Verb, town: Wire, robot: Robot) -> None:
     """What drove before the pause counts until the sim plays, as time stands still."""
     person = town.bus("person", lasting=True)
     commands = person.publisher("cmd_vel", Twist, "INTERACTIVE_HIGH", dead_man=False)
@@ -142,26 +145,26 @@ def test_of_a_paused_sim_it_says_so_instead_of_to_try_again(town: Wire, robot: R
 
     wait_for(driven)
     try:
-        assert town.run("sim", "pause").returncode == 0
+        assert verb(town, "sim", "pause").returncode == 0
         wait_for(driven)
         person.close()
-        done = town.run("topic", "pub", "cmd_vel", AHEAD, "-t", "5", "-r", "10")
+        done = verb(town, "topic", "pub", "cmd_vel", AHEAD, "-t", "5", "-r", "10")
     finally:
-        assert town.run("sim", "play").returncode == 0
+        assert verb(town, "sim", "play").returncode == 0
     assert (done.returncode, done.stderr.splitlines()[-1].startswith("not obeyed: ")) == (1, True), done.stderr
     assert done.stderr.endswith("; the sim is paused; `holozen sim play` continues it\n")
-    assert town.run("service", "call", "resume").returncode == 0
+    assert verb(town, "service", "call", "resume").returncode == 0
 
 
-def test_a_misspelt_key_is_refused_with_the_closest(town: Wire, robot: Robot) -> None:
+def test_a_misspelt_key_is_refused_with_the_closest(verb: Verb, town: Wire, robot: Robot) -> None:
     for key, meant in (("cmd_vl", "cmd_vel"), ("Fred/cmd_vle", "Fred/cmd_vel")):
         expected = f"holozen topic pub: '{key}' has no known type (did you mean '{meant}'?); known keys: cmd_vel, odom"
-        assert_one_line(town.run("topic", "pub", key, AHEAD, "--once"), 1, expected)
+        assert_one_line(verb(town, "topic", "pub", key, AHEAD, "--once"), 1, expected)
 
 
-def test_numbers_are_those_of_json_in_yaml_too(wire: Wire) -> None:
+def test_numbers_are_those_of_json_in_yaml_too(verb: Verb, wire: Wire) -> None:
     heard = wire.bus("other").subscribe("cmd_vel", Twist)  # the only one, for which it waits
-    assert wire.run("topic", "pub", "cmd_vel", "{linear: {x: 2e-1}}", "--once").returncode == 0
+    assert verb(wire, "topic", "pub", "cmd_vel", "{linear: {x: 2e-1}}", "--once").returncode == 0
     assert heard.recv().message == Twist.planar(0.2)
 
 
@@ -178,10 +181,10 @@ def test_it_reports_when_another_one_drives_and_when_it_is_obeyed(town: Wire, ro
     robot.stands()
 
 
-def test_a_forced_mistake_is_named_also_where_another_one_drives(town: Wire, robot: Robot) -> None:
+def test_a_forced_mistake_is_named_also_where_another_one_drives(verb: Verb, town: Wire, robot: Robot) -> None:
     driver = town.start("topic", "pub", "cmd_vel", AHEAD)
     robot.odom.next(lambda odom: moves(odom, 0.2, 0, 0))
-    done = town.run("topic", "pub", "cmd_vel", '{"linear": {"x": 1e308}}', "--once", "--force")
+    done = verb(town, "topic", "pub", "cmd_vel", '{"linear": {"x": 1e308}}', "--once", "--force")
     assert "not obeyed: linear.x is 1e+308 m/s; at most 100" in done.stderr
     driver.signal(signal.SIGINT)
     assert driver.wait() == 0
@@ -266,7 +269,7 @@ def test_a_line_that_is_no_text_ends_it_too(wire: Wire) -> None:
     assert done.stderr.startswith(b"holozen topic pub: cmd_vel: line 2 refused: ")
 
 
-def test_any_type_is_published_with_its_fields(town: Wire) -> None:
+def test_any_type_is_published_with_its_fields(verb: Verb, town: Wire) -> None:
     echo = town.start("topic", "echo", "scan", "--once", "--json")
     words = ["scan", "sensor_msgs/msg/LaserScan", "{ranges: [1, 2.5]}", "-r", "50"]
     for wire_name in ("json", "cdr"):
@@ -276,7 +279,7 @@ def test_any_type_is_published_with_its_fields(town: Wire) -> None:
         echo = town.start("topic", "echo", "scan", "--once", "--json")
     echo.close()
     expected = "holozen topic pub: scan: no type 'sensor_msgs/msg/LaserScn' (did you mean 'sensor_msgs/msg/LaserScan'?)"
-    assert_one_line(town.run("topic", "pub", "scan", "sensor_msgs/msg/LaserScn", "--once"), 1, expected)
+    assert_one_line(verb(town, "topic", "pub", "scan", "sensor_msgs/msg/LaserScn", "--once"), 1, expected)
 
 
 def test_lost_samples_are_counted_by_the_publishers_numbers(town: Wire) -> None:
@@ -317,7 +320,7 @@ def test_the_timeout_of_hz_is_for_the_first_messages_alone(town: Wire) -> None:
     assert hz.wait() == 0
 
 
-def test_a_sim_that_receives_no_command_is_no_success(town: Wire) -> None:
+def test_a_sim_that_receives_no_command_is_no_success(verb: Verb, town: Wire) -> None:
     """Its status goes on, but the commands do not get through, as in a flood of others."""
     bus, end = town.bus("deaf"), threading.Event()
     bus.subscribe("Deaf/cmd_vel", Twist)
@@ -330,7 +333,7 @@ def test_a_sim_that_receives_no_command_is_no_success(town: Wire) -> None:
     sim = threading.Thread(target=live)
     sim.start()
     try:
-        done = town.run("topic", "pub", "Deaf/cmd_vel", AHEAD, "--once")
+        done = verb(town, "topic", "pub", "Deaf/cmd_vel", AHEAD, "--once")
         assert (done.returncode, "not obeyed: the sim has not received it" in done.stderr) == (1, True)
         done = town.run("teleop", "Deaf", "--script", "-", given="3s i\n")
         assert (done.returncode, "the sim has received none of the commands" in done.stderr) == (1, True)

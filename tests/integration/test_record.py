@@ -17,6 +17,7 @@ from holozen.messages import Odometry, TFMessage, Twist, codec
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 
+from .conftest import Verb
 from .foreign_samples import PAYLOADS
 from .processes import read
 from .robots import Robot
@@ -24,10 +25,11 @@ from .robots import Robot
 BLOCK = zenoh.CongestionControl.BLOCK  # by default a burst loses some, before anybody receives it
 
 
-def info_of(path: Path, *flags: str) -> str:
+def info_of(call: Verb, path: Path, *flags: str) -> str:
     """What `holozen bag info` prints."""
-    words = command("bag", "info", str(path), *flags)
-    return subprocess.run(words, capture_output=True, text=True, timeout=30, check=True).stdout
+    done = call("bag", "info", str(path), *flags)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 def listening(wire: Wire, key: str) -> zenoh.Session:
@@ -56,13 +58,15 @@ def test_foreign_payloads_are_recorded_byte_for_byte_with_their_encodings(wire: 
     assert list(found.values())[:-1] == list(PAYLOADS.items())
 
 
-def test_a_live_robot_is_recorded_with_the_types_of_ros(town: Wire, robot: Robot, tmp_path: Path) -> None:
-    done = town.run("record", "-a", "-o", str(tmp_path / "a"), "--max-duration", "1.5", "--json")
+def test_a_live_robot_is_recorded_with_the_types_of_ros(
+    call: Verb, verb: Verb, town: Wire, robot: Robot, tmp_path: Path
+) -> None:
+    done = verb(town, "record", "-a", "-o", str(tmp_path / "a"), "--max-duration", "1.5", "--json")
     assert done.returncode == 0, done.stderr
     *_, last = map(json.loads, done.stdout.splitlines())
     assert last["files"] == [str(tmp_path / "a.mcap")]
     assert (last["dropped"], last["overran"], last["lost"], last["error"]) == (0, 0, 0, "")
-    info = json.loads(info_of(tmp_path / "a.mcap", "--json"))
+    info = json.loads(info_of(call, tmp_path / "a.mcap", "--json"))
     types = {topic["key"]: topic["type"] for topic in info["topics"]}
     assert types["odom"] == "nav_msgs/msg/Odometry"
     assert types["tf"] == "tf2_msgs/msg/TFMessage"
@@ -70,7 +74,7 @@ def test_a_live_robot_is_recorded_with_the_types_of_ros(town: Wire, robot: Robot
     assert all(topic["missing"] == 0 for topic in info["topics"])
 
 
-def test_a_killed_recorder_leaves_a_file_that_can_be_read(wire: Wire, tmp_path: Path) -> None:
+def test_a_killed_recorder_leaves_a_file_that_can_be_read(call: Verb, wire: Wire, tmp_path: Path) -> None:
     recorder = wire.start("record", "a", "-o", str(tmp_path / "a"))
     session = listening(wire, "a")
     for i in range(500):
@@ -83,7 +87,7 @@ def test_a_killed_recorder_leaves_a_file_that_can_be_read(wire: Wire, tmp_path: 
     found = read(path)
     assert [m.payload for m in found] == [b"%d" % i for i in range(len(found))]
     assert len(found) >= 500
-    assert "the recording was cut off" in info_of(path)
+    assert "the recording was cut off" in info_of(call, path)
 
 
 @pytest.mark.parametrize("keys", [("-a",), ("map", "tf_static", "odom")])
@@ -190,23 +194,25 @@ print(json.dumps(result | {"mcap": summary.statistics.message_count}))
 """
 
 
-def test_an_error_is_reported_in_one_line(wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_is_reported_in_one_line(
+    verb: Verb, wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for words, code, part in [
         (("odom", "-o", "/nowhere/a"), 1, "cannot write /nowhere/a.mcap: No such file or directory"),
         (("odom", "--max-size", "0"), 2, "use a number from 0.1"),
         (("a//b", "-o", "a"), 1, "key 'a//b'"),
     ]:
         monkeypatch.chdir(tmp_path)
-        done = wire.run("record", *words)
+        done = verb(wire, "record", *words)
         assert done.returncode == code, done.stderr
         assert part in done.stderr.splitlines()[-1]
         assert "Traceback" not in done.stderr
         assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_that_exists_is_not_written_over(wire: Wire, tmp_path: Path) -> None:
+def test_a_file_that_exists_is_not_written_over(verb: Verb, wire: Wire, tmp_path: Path) -> None:
     (tmp_path / "a.mcap").write_text("precious")
-    done = wire.run("record", "a", "-o", str(tmp_path / "a"))
+    done = verb(wire, "record", "a", "-o", str(tmp_path / "a"))
     assert done.returncode == 1
     assert done.stderr.endswith("a.mcap: File exists; choose another name with -o\n")
     assert (tmp_path / "a.mcap").read_text() == "precious"
@@ -243,10 +249,12 @@ def test_regular_expressions_choose_keys_and_leave_some_out(
     assert "deletions" not in recorder.out
 
 
-def test_for_ros_the_robot_is_recorded_in_cdr_by_the_sims_own_clock(town: Wire, robot: Robot, tmp_path: Path) -> None:
+def test_for_ros_the_robot_is_recorded_in_cdr_by_the_sims_own_clock(
+    verb: Verb, town: Wire, robot: Robot, tmp_path: Path
+) -> None:
     path = tmp_path / "a.mcap"
     words = ("odom", "tf", "-o", str(path), "--max-duration", "1", "--wire", "cdr", "--use-sim-time")
-    done = town.run("record", *words)
+    done = verb(town, "record", *words)
     assert done.returncode == 0, done.stderr
     stamps = []
     for message in read(path):

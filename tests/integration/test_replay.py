@@ -28,6 +28,7 @@ from holozen.transport.graph import on_key
 from holozen.transport.samples import RawSubscriber, Sample
 from tests.terminals.operators import BOX
 
+from .conftest import Verb
 from .foreign_samples import PAYLOADS
 from .processes import read
 from .robots import Robot, moves, speeds
@@ -65,10 +66,10 @@ def commands(count: int, every: float = 50.0) -> list[tuple[str, bytes, str, flo
     return [("cmd_vel", FORWARD, "application/json", i * every) for i in range(count)]
 
 
-def test_payloads_and_encodings_are_those_of_the_bag(wire: Wire, tmp_path: Path) -> None:
+def test_payloads_and_encodings_are_those_of_the_bag(verb: Verb, wire: Wire, tmp_path: Path) -> None:
     rows = [(f"any/{i}", payload, encoding, i * 5) for i, (encoding, payload) in enumerate(PAYLOADS.items())]
     tap = wire.bus().subscribe_raw("any/**")
-    done = wire.run("replay", bag(tmp_path / "a.mcap", *rows))
+    done = verb(wire, "replay", bag(tmp_path / "a.mcap", *rows))
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith(f"played {len(rows)} messages in ")
     assert [(s.key, s.payload, s.encoding) for s in heard(tap, count=len(rows))] == [
@@ -76,12 +77,12 @@ def test_payloads_and_encodings_are_those_of_the_bag(wire: Wire, tmp_path: Path)
     ]
 
 
-def test_a_recording_is_played_to_a_second_recorder(wire: Wire, tmp_path: Path) -> None:
+def test_a_recording_is_played_to_a_second_recorder(verb: Verb, wire: Wire, tmp_path: Path) -> None:
     rows = [("a", b"%d" % i, "text/plain", i) for i in range(300)]
     first = bag(tmp_path / "first.mcap", *rows)
     recorder = wire.start("record", "b", "-o", str(tmp_path / "again"))
     recorder.wait_for_line("recording b")
-    done = wire.run("replay", first, "--remap", "a:=b", "--json", "--start-offset", "0.1", "--until", "0.199")
+    done = verb(wire, "replay", first, "--remap", "a:=b", "--json", "--start-offset", "0.1", "--until", "0.199")
     assert json.loads(done.stdout)["messages"] == 100, done.stderr
     recorder.signal(signal.SIGINT)
     assert recorder.wait() == 0, recorder.err
@@ -91,34 +92,38 @@ def test_a_recording_is_played_to_a_second_recorder(wire: Wire, tmp_path: Path) 
     assert found
 
 
-def test_beside_a_live_robot_nothing_is_played_that_could_disturb_it(town: Wire, robot: Robot, tmp_path: Path) -> None:
+def test_beside_a_live_robot_nothing_is_played_that_could_disturb_it(
+    verb: Verb, town: Wire, robot: Robot, tmp_path: Path
+) -> None:
     odom = ("odom", codec.encode(Odometry()), "application/json", 0.0)
     path = bag(tmp_path / "a.mcap", odom, *commands(3), ("note", b"hello", "text/plain", 1.0))
     tap = robot.bus.subscribe_raw("note")
-    done = town.run("replay", path)
+    done = verb(town, "replay", path)
     assert done.returncode == 0
     assert done.stderr.splitlines() == [
         "cmd_vel is left out: it moves robots; --commands plays it too",
         "odom is left out: sim publishes it now; --remap odom:=NEW plays it elsewhere",
     ]
     assert [s.payload for s in heard(tap, count=1)] == [b"hello"]
-    done = town.run("replay", path, "--topics", "cmd_vel")
+    done = verb(town, "replay", path, "--topics", "cmd_vel")
     assert done.returncode == 1
     assert done.stderr == "holozen replay: cmd_vel: it moves robots; --commands plays it too\n"
 
 
-def test_a_recording_of_a_running_sim_explains_how_to_play_it(town: Wire, robot: Robot, tmp_path: Path) -> None:
+def test_a_recording_of_a_running_sim_explains_how_to_play_it(
+    verb: Verb, town: Wire, robot: Robot, tmp_path: Path
+) -> None:
     path = bag(tmp_path / "a.mcap", ("odom", codec.encode(Odometry()), "application/json", 0.0))
-    done = town.run("replay", path)
+    done = verb(town, "replay", path)
     advice = "nothing was played; end sim first, or play under other keys, such as --remap odom:=old/odom"
     assert (done.returncode, done.stderr.splitlines()[-1]) == (1, f"holozen replay: {advice}")
-    assert town.run("replay", path, "--remap", "odom:=old/odom").returncode == 0
+    assert verb(town, "replay", path, "--remap", "odom:=old/odom").returncode == 0
 
 
-def test_commands_drive_the_robot_and_a_stop_ends_them(town: Wire, robot: Robot, tmp_path: Path) -> None:
+def test_commands_drive_the_robot_and_a_stop_ends_them(verb: Verb, town: Wire, robot: Robot, tmp_path: Path) -> None:
     path = bag(tmp_path / "a.mcap", *commands(8), types=(Twist,))
     tap = robot.bus.subscribe_raw("cmd_vel")
-    done = town.run("replay", path, "--commands")
+    done = verb(town, "replay", path, "--commands")
     assert done.returncode == 0, done.stderr
     sent = heard(tap, count=8, last=STOPS)
     assert [s.payload for s in sent[:8]] == [FORWARD] * 8
@@ -127,16 +132,16 @@ def test_commands_drive_the_robot_and_a_stop_ends_them(town: Wire, robot: Robot,
     assert [s.payload for s in sent[8:]] == STOPS
 
 
-def test_commands_that_a_robot_does_not_obey_are_reported(town: Wire, robot: Robot, tmp_path: Path) -> None:
+def test_commands_that_a_robot_does_not_obey_are_reported(verb: Verb, town: Wire, robot: Robot, tmp_path: Path) -> None:
     path = bag(tmp_path / "a.mcap", *commands(20), types=(Twist,))
-    assert town.run("stop").returncode == 0
-    done = town.run("replay", path, "--commands")
-    assert town.run("release").returncode == 0
+    assert verb(town, "stop").returncode == 0
+    done = verb(town, "replay", path, "--commands")
+    assert verb(town, "release").returncode == 0
     assert done.returncode == 1
     assert re.fullmatch(r"not obeyed: stop@\w+ has set the software stop\n", done.stderr)
 
 
-def test_a_robot_that_comes_while_it_plays_is_not_moved(wire: Wire, tmp_path: Path) -> None:
+def test_a_robot_that_comes_while_it_plays_is_not_moved(verb: Verb, wire: Wire, tmp_path: Path) -> None:
     """The bag does not know the type of what moves it: nobody listened when it was recorded."""
     rows = [("Ann/drive", FORWARD, "", i * 20.0) for i in range(20)]
     path = bag(tmp_path / "a.mcap", *rows, ("note", b"hello", "text/plain", 1.0))
@@ -146,7 +151,7 @@ def test_a_robot_that_comes_while_it_plays_is_not_moved(wire: Wire, tmp_path: Pa
     wire.start("sim", "--empty").wait_for_line("no robot yet")
     player = wire.start("replay", path, "--loop")
     notes.recv()
-    assert wire.run("spawn", str(box), "--name", "Ann").returncode == 0
+    assert verb(wire, "spawn", str(box), "--name", "Ann").returncode == 0
     robot = Robot(wire.bus(), "Ann")
     notes.try_recv()
     for _ in range(3):  # the bag has begun again
@@ -160,22 +165,24 @@ def test_a_robot_that_comes_while_it_plays_is_not_moved(wire: Wire, tmp_path: Pa
 @pytest.mark.parametrize("form", ["json", "msgpack", "cdr"])
 @pytest.mark.parametrize("command", [Twist.planar(0.1), TwistStamped(twist=Twist.planar(0.1)), Wrench(Vector3(1.0))])
 def test_what_robots_would_read_as_a_command_is_one_whatever_its_key(
-    wire: Wire, tmp_path: Path, form: str, command: Message
+    verb: Verb, wire: Wire, tmp_path: Path, form: str, command: Message
 ) -> None:
     kind = type(command)
     row = ("any", codec.encode(command, form), codec.encoding(form, kind), 0.0)
     tap = wire.bus().subscribe_raw("any")
     path = bag(tmp_path / "a.mcap", row)
-    assert wire.run("replay", path).returncode == 1
-    assert wire.run("replay", path, "--commands").returncode == 0
+    assert verb(wire, "replay", path).returncode == 1
+    assert verb(wire, "replay", path, "--commands").returncode == 0
     sent = [codec.decode(s.payload, s.encoding, (kind,)) for s in heard(tap, count=6)]
     assert sent == [command, *[kind()] * 5]
 
 
-def test_what_moves_nothing_is_played_on_any_key(wire: Wire, tmp_path: Path) -> None:
+def test_what_moves_nothing_is_played_on_any_key(verb: Verb, wire: Wire, tmp_path: Path) -> None:
     payloads = [b"{}", b'{"linear": {"x": 0}}', codec.encode(Odometry()), b"0.1", FORWARD.ljust(70_000)]
     tap = wire.bus().subscribe_raw("any")
-    done = wire.run("replay", bag(tmp_path / "a.mcap", *[("any", p, "text/plain", i) for i, p in enumerate(payloads)]))
+    done = verb(
+        wire, "replay", bag(tmp_path / "a.mcap", *[("any", p, "text/plain", i) for i, p in enumerate(payloads)])
+    )
     assert (done.returncode, done.stderr) == (0, "")
     assert [s.payload for s in heard(tap, count=len(payloads))] == payloads
 
@@ -197,18 +204,18 @@ def test_stamped_commands_drive_with_a_stamp_of_now(town: Wire, robot: Robot, tm
     assert begun - 1 < command.header.stamp.seconds() < time.time() + 1
 
 
-def test_stamped_joint_commands_get_a_stamp_of_now(wire: Wire, tmp_path: Path) -> None:
+def test_stamped_joint_commands_get_a_stamp_of_now(verb: Verb, wire: Wire, tmp_path: Path) -> None:
     old = codec.encode(JointState(Header(Time(1_700_000_000)), ["arm"], velocity=[1.0]))
     tap, begun = wire.bus().subscribe_raw("joint_command"), time.time()
-    done = wire.run("replay", bag(tmp_path / "a.mcap", ("joint_command", old, "application/json", 0.0)), "--commands")
+    done = verb(wire, "replay", bag(tmp_path / "a.mcap", ("joint_command", old, "application/json", 0.0)), "--commands")
     assert done.returncode == 0, done.stderr
     command = codec.decode(heard(tap, count=1)[0].payload, "application/json", (JointState,))
     assert command.velocity == [1.0] and begun - 1 < command.header.stamp.seconds() < time.time() + 1
 
 
-def test_at_the_end_it_names_the_goals_that_still_drive(wire: Wire, tmp_path: Path) -> None:
+def test_at_the_end_it_names_the_goals_that_still_drive(verb: Verb, wire: Wire, tmp_path: Path) -> None:
     goal = codec.encode(PoseStamped())
-    done = wire.run("replay", bag(tmp_path / "a.mcap", ("goal_pose", goal, "application/json", 0.0)), "--commands")
+    done = verb(wire, "replay", bag(tmp_path / "a.mcap", ("goal_pose", goal, "application/json", 0.0)), "--commands")
     assert done.returncode == 0, done.stderr
     assert done.stderr == "goal_pose: the robot may drive on to the last goal, since its controller drives it\n"
 
@@ -252,14 +259,14 @@ def test_it_may_begin_with_a_pause(wire: Wire, tmp_path: Path) -> None:
     assert terminal.process.wait() == 0
 
 
-def test_it_may_wait_before_it_begins(wire: Wire, tmp_path: Path) -> None:
+def test_it_may_wait_before_it_begins(verb: Verb, wire: Wire, tmp_path: Path) -> None:
     bus = wire.bus()
     player = wire.start("bag", "play", "--delay", "1000", bag(tmp_path / "a.mcap", ("a", b"x", "", 0.0)))
     wait_for(lambda: on_key(bus.endpoints(), "a", "pub"))
     player.signal(signal.SIGINT)
     assert player.wait() == 0
     assert player.out.startswith("played 0 messages")
-    quick = wire.run("bag", "play", "-d", "0.1", str(tmp_path / "a.mcap"))
+    quick = verb(wire, "bag", "play", "-d", "0.1", str(tmp_path / "a.mcap"))
     assert quick.stdout.startswith("played 1 messages")
 
 
@@ -298,7 +305,9 @@ def test_a_loop_plays_until_it_is_ended(wire: Wire, tmp_path: Path) -> None:
     assert player.wait() == 0
 
 
-def test_an_error_is_reported_in_one_line(wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_is_reported_in_one_line(
+    verb: Verb, wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     bag(tmp_path / "a.mcap", ("a", b"x", "", 0.0))
     for words, code, part in [
         (("none.mcap",), 1, "cannot read none.mcap: No such file or directory"),
@@ -307,7 +316,7 @@ def test_an_error_is_reported_in_one_line(wire: Wire, tmp_path: Path, monkeypatc
         (("a.mcap", "--start-offset", "9"), 1, "no message is between --start-offset and --until"),
     ]:
         monkeypatch.chdir(tmp_path)
-        done = wire.run("replay", *words)
+        done = verb(wire, "replay", *words)
         assert done.returncode == code, done.stderr
         assert part in done.stderr.splitlines()[-1]
         assert "Traceback" not in done.stderr

@@ -15,7 +15,7 @@ from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 from holozen.wire import SERVICES
 
-from .conftest import start_sim
+from .conftest import Verb, start_sim
 from .processes import assert_one_line
 from .robots import Robot, place
 
@@ -37,25 +37,25 @@ def only_robot(town: Wire) -> Robot:
     return Robot(town.bus())
 
 
-def test_service_list_names_every_service(town: Wire) -> None:
+def test_service_list_names_every_service(verb: Verb, town: Wire) -> None:
     """Those of the table, and those by which each process serves its parameters."""
     services = {service.key: service.reply.ROS for service in SERVICES}
 
     def shown() -> list[str]:
-        return town.run("service", "list").stdout.split()
+        return verb(town, "service", "list").stdout.split()
 
     # A node that does not answer within half a second is not waited for.
     wait_for(
         lambda: {key for key in shown() if not key.endswith("_parameters")} == set(services), what=lambda: repr(shown())
     )
     assert (listed := shown()) == sorted(set(listed))
-    lines = town.run("service", "list", "-t").stdout.splitlines()
+    lines = verb(town, "service", "list", "-t").stdout.splitlines()
     assert {f"{key} [{kind}]" for key, kind in services.items()} <= set(lines)
     assert "resume [std_srvs/srv/Trigger]" in lines
 
 
-def test_service_call_prints_the_reply(town: Wire) -> None:
-    done = town.run("service", "call", "next_goal", '{"request_goal": 3}')
+def test_service_call_prints_the_reply(verb: Verb, town: Wire) -> None:
+    done = verb(town, "service", "call", "next_goal", '{"request_goal": 3}')
     assert done.returncode == 0
     lines = [line.split(": ") for line in done.stdout.splitlines()]
     assert {name: float(value) for name, value in lines} == {
@@ -64,30 +64,30 @@ def test_service_call_prints_the_reply(town: Wire) -> None:
         "theta_goal": 0,
         "end_of_list": 1,
     }
-    as_json = town.run("service", "call", "/next_goal", "request_goal: 3", "--json").stdout
+    as_json = verb(town, "service", "call", "/next_goal", "request_goal: 3", "--json").stdout
     assert json.loads(as_json) == {"x_goal": 0.0, "y_goal": 0.0, "theta_goal": 0.0, "end_of_list": 1}
 
 
-def test_service_call_of_another_type_is_refused(town: Wire) -> None:
-    done = town.run("service", "call", "next_goal", "std_srvs/srv/Trigger", "{}")
+def test_service_call_of_another_type_is_refused(verb: Verb, town: Wire) -> None:
+    done = verb(town, "service", "call", "next_goal", "std_srvs/srv/Trigger", "{}")
     assert_one_line(done, 1, "next_goal: its type is holozen/srv/NextGoal, not std_srvs/srv/Trigger")
-    assert town.run("service", "call", "next_goal", "holozen/NextGoal", "{}").returncode == 0
+    assert verb(town, "service", "call", "next_goal", "holozen/NextGoal", "{}").returncode == 0
 
 
-def test_service_call_without_a_request_sends_zeros(town: Wire, robot: Robot) -> None:
-    assert town.run("service", "call", "next_goal").stdout.startswith("x_goal: 1.0\n")
+def test_service_call_without_a_request_sends_zeros(verb: Verb, town: Wire, robot: Robot) -> None:
+    assert verb(town, "service", "call", "next_goal").stdout.startswith("x_goal: 1.0\n")
     before = place(robot.newest())
 
     def pose() -> str:  # empty while its odom is stale, or none came yet
-        return town.run("service", "call", "get_pose", "--json").stdout
+        return verb(town, "service", "call", "get_pose", "--json").stdout
 
     position = json.loads(wait_for(pose))["odom"]["pose"]["pose"]["position"]
     assert (position["x"], position["y"]) == pytest.approx(before[:2], abs=1e-6)
 
 
 @pytest.mark.parametrize("wire_name", ["json", "msgpack"])
-def test_service_call_on_either_wire(town: Wire, wire_name: str) -> None:
-    done = town.run("service", "call", "next_goal", '{"request_goal": 1}', "--wire", wire_name)
+def test_service_call_on_either_wire(verb: Verb, town: Wire, wire_name: str) -> None:
+    done = verb(town, "service", "call", "next_goal", '{"request_goal": 1}', "--wire", wire_name)
     assert done.stdout.startswith("x_goal: 1.0\ny_goal: 1.0\n")
 
 
@@ -107,14 +107,16 @@ def test_service_call_on_either_wire(town: Wire, wire_name: str) -> None:
         (["ring"], 2, "'ring'"),
     ],
 )
-def test_a_failing_call_gives_its_reason_in_one_line(town: Wire, words: list[str], code: int, reason: str) -> None:
-    assert_one_line(town.run("service", *words), code, reason)
+def test_a_failing_call_gives_its_reason_in_one_line(
+    verb: Verb, town: Wire, words: list[str], code: int, reason: str
+) -> None:
+    assert_one_line(verb(town, "service", *words), code, reason)
 
 
-def test_node_list_names_the_running_nodes(town: Wire) -> None:
+def test_node_list_names_the_running_nodes(verb: Verb, town: Wire) -> None:
     def nodes() -> list[str]:
         """Those but this process, which is one where it publishes commands."""
-        return [name for name in town.run("node", "list").stdout.split() if name != "test"]
+        return [name for name in verb(town, "node", "list").stdout.split() if name != "test"]
 
     wait_for(lambda: nodes() == ["pose_service", "sim"])
     with town.terminal("teleop") as terminal:
@@ -167,8 +169,8 @@ def test_a_router_whose_port_is_taken_reports_it(town: Wire) -> None:
     assert_one_line(done, 1, "holozen router: cannot open Zenoh: ", str(town.port))
 
 
-def test_an_unknown_verb_is_one_line(town: Wire) -> None:
-    assert_one_line(town.run("drive"), 2, "holozen: no verb 'drive'; `holozen --help` lists the verbs")
+def test_an_unknown_verb_is_one_line(verb: Verb, town: Wire) -> None:
+    assert_one_line(verb(town, "drive"), 2, "holozen: no verb 'drive'; `holozen --help` lists the verbs")
 
 
 def test_help_names_every_verb() -> None:
@@ -198,13 +200,13 @@ def test_output_into_a_reader_that_is_gone_ends_quietly(verb: str, unbuffered: s
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_service_type_find_and_info(town: Wire) -> None:
-    assert town.run("service", "type", "resume").stdout == "std_srvs/srv/Trigger\n"
-    assert town.run("service", "find", "NextGoal").stdout == "next_goal\n"
-    lines = town.run("service", "info", "next_goal").stdout.splitlines()
+def test_service_type_find_and_info(verb: Verb, town: Wire) -> None:
+    assert verb(town, "service", "type", "resume").stdout == "std_srvs/srv/Trigger\n"
+    assert verb(town, "service", "find", "NextGoal").stdout == "next_goal\n"
+    lines = verb(town, "service", "info", "next_goal").stdout.splitlines()
     assert lines[:2] == ["Type: holozen/srv/NextGoal", "Services count: 1"]
     assert lines[2].startswith("  pose_service (")
-    output = json.loads(town.run("service", "info", "next_goal", "--json").stdout)
+    output = json.loads(verb(town, "service", "info", "next_goal", "--json").stdout)
     assert [server["node"] for server in output["servers"]] == ["pose_service"]
 
 
@@ -216,35 +218,35 @@ def test_service_call_again_and_again(town: Wire) -> None:
     assert set(call.out.splitlines()[:3]) == {call.out.splitlines()[0]}
 
 
-def test_node_info_shows_what_a_node_reads_writes_and_serves(town: Wire) -> None:
-    lines = town.run("node", "info", "sim").stdout.splitlines()
+def test_node_info_shows_what_a_node_reads_writes_and_serves(verb: Verb, town: Wire) -> None:
+    lines = verb(town, "node", "info", "sim").stdout.splitlines()
     assert lines[1:3] == ["  Subscribers:", "    cmd_vel: geometry_msgs/msg/Twist"]
     assert "    odom: nav_msgs/msg/Odometry" in lines[lines.index("  Publishers:") : lines.index("  Service Servers:")]
     servers = lines.index("  Action Servers:")
     assert "    resume: std_srvs/srv/Trigger" in lines[lines.index("  Service Servers:") : servers]
     assert lines[servers + 1] == "    simulate_steps: simulation_interfaces/action/SimulateSteps"
     assert not any("_action" in line for line in lines)
-    output = json.loads(town.run("node", "info", "/sim", "--json").stdout)
+    output = json.loads(verb(town, "node", "info", "/sim", "--json").stdout)
     assert {"key": "odom", "type": "nav_msgs/msg/Odometry"} in output["publishers"]
     assert [row["key"] for row in output["action_servers"]] == ["simulate_steps"]
 
 
-def test_lists_count_and_write_json(town: Wire) -> None:
-    assert int(town.run("service", "list", "-c").stdout) >= len(SERVICES)
-    rows = [json.loads(line) for line in town.run("service", "list", "--json").stdout.splitlines()]
+def test_lists_count_and_write_json(verb: Verb, town: Wire) -> None:
+    assert int(verb(town, "service", "list", "-c").stdout) >= len(SERVICES)
+    rows = [json.loads(line) for line in verb(town, "service", "list", "--json").stdout.splitlines()]
     assert {"key": "resume", "type": "std_srvs/srv/Trigger"} in rows
-    names = [json.loads(line)["node"] for line in town.run("node", "list", "--json").stdout.splitlines()]
+    names = [json.loads(line)["node"] for line in verb(town, "node", "list", "--json").stdout.splitlines()]
     assert {"pose_service", "sim"} <= {*names}
-    assert town.run("node", "list", "-c").stdout == f"{len(names)}\n"
+    assert verb(town, "node", "list", "-c").stdout == f"{len(names)}\n"
 
 
-def test_the_graph_shows_writers_and_readers(town: Wire, robot: Robot) -> None:
-    lines = town.run("graph").stdout.splitlines()
+def test_the_graph_shows_writers_and_readers(verb: Verb, town: Wire, robot: Robot) -> None:
+    lines = verb(town, "graph").stdout.splitlines()
     assert "sim -> odom -> pose_service, test" in lines
     assert "next_goal: pose_service" in lines
-    dot = town.run("graph", "--dot").stdout
+    dot = verb(town, "graph", "--dot").stdout
     assert dot.startswith("digraph holozen {\n")
     assert '  "node sim" -> "odom";\n' in dot
     assert '  "odom" -> "node pose_service";\n' in dot
-    ends = [json.loads(line) for line in town.run("graph", "--json").stdout.splitlines()]
+    ends = [json.loads(line) for line in verb(town, "graph", "--json").stdout.splitlines()]
     assert {"odom"} <= {end["key"] for end in ends if end["kind"] == "pub" and end["node"] == "sim"}

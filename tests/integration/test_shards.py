@@ -3,19 +3,17 @@
 import os
 import re
 import signal
-import subprocess
-from collections.abc import Callable
 
 import pytest
 
 from holozen import data
 from holozen.testing import Process, Wire, wait_for
 
+from .conftest import Verb
 from .processes import assert_one_line, parts_at
 from .robots import Robot
 
 BOT = data.find("urdf", "hb_bot.urdf.xacro")
-Verb = Callable[..., subprocess.CompletedProcess[str]]
 OF_FIRST, OF_SECOND = "bot4", "bot0"  # of two shards
 
 

@@ -30,7 +30,7 @@ from holozen.transport.errors import ServiceError
 from holozen.transport.pubsub import Publisher
 from holozen.wire import key_for
 
-from .conftest import start_sim
+from .conftest import Verb, start_sim
 from .robots import URDF, Robot, distance, moves, rests, speeds
 
 PERSON, SCRIPT, AUTOPILOT = "INTERACTIVE_HIGH", "DATA", "DATA_LOW"
@@ -129,7 +129,9 @@ def slows(robot: Robot, limit: float = SLOW) -> Callable[[], object]:
 
 
 @pytest.mark.parametrize("name", ["hb_bot.urdf.xacro", "rover.urdf.xacro", "wheely_boi.xacro"])
-def test_whatever_is_commanded_a_stopped_robot_stands(town: Wire, sim: Process, flood: Flood, name: str) -> None:
+def test_whatever_is_commanded_a_stopped_robot_stands(
+    verb: Verb, town: Wire, sim: Process, flood: Flood, name: str
+) -> None:
     spawn_file(town.bus(), URDF / name, "Rob", Place(y=5.0))
     with ready(Robot(town.bus(), "Rob")) as robot:
         for node, priority in (("person", PERSON), ("script", SCRIPT), ("autopilot", AUTOPILOT)):
@@ -137,7 +139,7 @@ def test_whatever_is_commanded_a_stopped_robot_stands(town: Wire, sim: Process, 
         if name.startswith("rover"):
             flood.add("Rob/joint_command", JointState(name=WHEELS, velocity=[8.0] * 4), PERSON, "hands")
         robot.odom.next(lambda odom: speeds(odom)[0] > 0.3)
-        assert town.run("stop", "Rob").stdout == "Rob is stopped\n"
+        assert verb(town, "stop", "Rob").stdout == "Rob is stopped\n"
         wait_for(slows(robot), what="it to stand")
         robot.pass_time(1.0)  # what balances sways for a moment
         odoms = stands_for(robot, 0.5)
@@ -280,15 +282,17 @@ def test_a_robot_in_the_place_of_a_stopped_one_is_stopped(town: Wire, sim: Proce
     entities.delete(bus, "Ann")
 
 
-def test_one_command_stops_all_robots_beside_a_process_that_sleeps(town: Wire, robots: dict[str, Robot]) -> None:
+def test_one_command_stops_all_robots_beside_a_process_that_sleeps(
+    verb: Verb, town: Wire, robots: dict[str, Robot]
+) -> None:
     sleeper = town.start("pose-service")
     sleeper.wait_for_line("goals")
     sleeper.signal(signal.SIGSTOP)
-    done = town.run("stop")
+    done = verb(town, "stop")
     assert {f"{name} is stopped" for name in robots} <= set(done.stdout.splitlines())
     assert (done.returncode, done.stderr) == (0, "")
     assert all(robot.status().stopped for robot in robots.values())
-    assert town.run("release").returncode == 0
+    assert verb(town, "release").returncode == 0
     assert not any(robot.status().stopped for robot in robots.values())
     sleeper.signal(signal.SIGCONT)
 

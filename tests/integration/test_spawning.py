@@ -16,6 +16,7 @@ from holozen.robot.xacro import expand_xacro
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.errors import ServiceError
 
+from .conftest import Verb
 from .robots import Robot, distance, place
 
 REPO = Path(__file__).parents[2]
@@ -50,47 +51,49 @@ def keys(bus: Bus) -> set[str]:
     return {endpoint.key for endpoint in bus.graph().settled(bus.connected) if endpoint.node == "sim"}
 
 
-def done(wire: Wire, verb: str, *words: str) -> str:
+def done(verb: Verb, wire: Wire, *words: str) -> str:
     """What a verb prints that ends well."""
-    ended = wire.run(verb, *words)
+    ended = verb(wire, *words)
     assert (ended.returncode, ended.stderr) == (0, "")
     return ended.stdout
 
 
-def refused(wire: Wire, verb: str, *words: str) -> str:
+def refused(verb: Verb, wire: Wire, *words: str) -> str:
     """The one line of a verb that ends badly."""
-    ended = wire.run(verb, *words)
+    ended = verb(wire, *words)
     assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (1, "", 1), ended
     return ended.stderr
 
 
-def test_a_robot_is_spawned_under_a_name_driven_listed_and_deleted(wire: Wire, sim: Process) -> None:
-    assert done(wire, "spawn", HB_BOT, "--name", "Fred", "-x", "1", "-Y", "1.5") == "Fred listens on Fred/cmd_vel\n"
+def test_a_robot_is_spawned_under_a_name_driven_listed_and_deleted(verb: Verb, wire: Wire, sim: Process) -> None:
+    assert (
+        done(verb, wire, "spawn", HB_BOT, "--name", "Fred", "-x", "1", "-Y", "1.5") == "Fred listens on Fred/cmd_vel\n"
+    )
     fred = Robot(wire.bus(), "Fred")
     start = fred.stands()
     assert place(start) == pytest.approx((1, 0, 1.5), abs=1e-3)
     assert (start.header.frame_id, start.child_frame_id) == ("Fred/odom", "Fred/footprint_link")
     fred.drive(0.5, until=lambda odom: distance(odom, start) > 0.3)
     fred.stop()
-    (output,) = [json.loads(line) for line in done(wire, "list", "--json").splitlines()]
+    (output,) = [json.loads(line) for line in done(verb, wire, "list", "--json").splitlines()]
     assert output["name"] == "Fred"
     assert output["pose"]["position"]["y"] > 0.29
-    assert "Fred" in done(wire, "delete", "Fred")
-    assert wire.run("list").stdout == ""
+    assert "Fred" in done(verb, wire, "delete", "Fred")
+    assert verb(wire, "list").stdout == ""
 
 
-def test_a_robot_without_a_height_stands_on_the_ground_and_with_one_falls(wire: Wire, sim: Process) -> None:
-    done(wire, "spawn", HB_BOT, "--name", "low")
-    done(wire, "spawn", HB_BOT, "--name", "high", "-x", "5", "-z", "0.5")
+def test_a_robot_without_a_height_stands_on_the_ground_and_with_one_falls(verb: Verb, wire: Wire, sim: Process) -> None:
+    done(verb, wire, "spawn", HB_BOT, "--name", "low")
+    done(verb, wire, "spawn", HB_BOT, "--name", "high", "-x", "5", "-z", "0.5")
     low, high = Robot(wire.bus(), "low"), Robot(wire.bus("other"), "high")
     assert low.odom.messages()[0].pose.pose.position.z == pytest.approx(-0.04, abs=1e-3)
     high.odom.next(lambda odom: abs(odom.pose.pose.position.z + 0.04) < 2e-3)
 
 
 def test_the_teleop_and_the_controller_work_on_a_robot_that_came_later(
-    wire: Wire, sim: Process, tmp_path: Path
+    verb: Verb, wire: Wire, sim: Process, tmp_path: Path
 ) -> None:
-    done(wire, "spawn", HB_BOT, "--name", "Fred")
+    done(verb, wire, "spawn", HB_BOT, "--name", "Fred")
     fred = Robot(wire.bus(), "Fred")
     terminal = wire.terminal("teleop", "Fred")
     terminal.wait_for_text("listening sim")
@@ -107,35 +110,35 @@ def test_the_teleop_and_the_controller_work_on_a_robot_that_came_later(
 
 
 def test_a_repeated_name_an_unknown_robot_and_a_wrong_file_are_reported_with_the_known_ones(
-    wire: Wire, sim: Process, tmp_path: Path
+    verb: Verb, wire: Wire, sim: Process, tmp_path: Path
 ) -> None:
-    done(wire, "spawn", HB_BOT, "--name", "Fred")
+    done(verb, wire, "spawn", HB_BOT, "--name", "Fred")
     wrong = tmp_path / "wrong.urdf"
     wrong.write_text('<robot name="r"><link name="a"/><link name="b"/></robot>')
-    taken = refused(wire, "spawn", HB_BOT, "--name", "Fred")
+    taken = refused(verb, wire, "spawn", HB_BOT, "--name", "Fred")
     assert "there is an entity 'Fred' already; the entities are Fred" in taken
-    assert "there is no entity 'Ann'; the entities are Fred" in refused(wire, "delete", "Ann")
-    assert f"{wrong}, line 1: <robot name='r'> has 2 root links" in refused(wire, "spawn", str(wrong))
-    assert "no such" in refused(wire, "spawn", str(tmp_path / "none.urdf")).lower()
-    assert wire.run("spawn", HB_BOT, "--name", "a/*").returncode == 2
-    assert [line.split()[0] for line in done(wire, "list").splitlines()] == ["Fred"]
+    assert "there is no entity 'Ann'; the entities are Fred" in refused(verb, wire, "delete", "Ann")
+    assert f"{wrong}, line 1: <robot name='r'> has 2 root links" in refused(verb, wire, "spawn", str(wrong))
+    assert "no such" in refused(verb, wire, "spawn", str(tmp_path / "none.urdf")).lower()
+    assert verb(wire, "spawn", HB_BOT, "--name", "a/*").returncode == 2
+    assert [line.split()[0] for line in done(verb, wire, "list").splitlines()] == ["Fred"]
 
 
-def test_a_second_robot_at_the_root_is_refused_with_what_helps(wire: Wire, sim: Process) -> None:
+def test_a_second_robot_at_the_root_is_refused_with_what_helps(verb: Verb, wire: Wire, sim: Process) -> None:
     root = ("--namespace", "/")
-    done(wire, "spawn", HB_BOT, *root)
+    done(verb, wire, "spawn", HB_BOT, *root)
     taken = (
         "cmd_vel is the key of 'hb_bot'; delete that one, or use a namespace; --namespace NAME (-robot_namespace NAME)"
     )
     for more in ((), ("--replace",)):
-        told = refused(wire, "spawn", HB_BOT, "--name", "Other", "-x", "5", *root, *more)
+        told = refused(verb, wire, "spawn", HB_BOT, "--name", "Other", "-x", "5", *root, *more)
         assert told == f"holozen spawn: {taken} gives one\n"
-    assert "--replace takes its place, --name gives another" in refused(wire, "spawn", HB_BOT, *root, "-x", "5")
-    done(wire, "spawn", HB_BOT, "--name", "Other", "-x", "5", "--namespace", "lab")
-    done(wire, "spawn", HB_BOT, "--name", "hb_bot", "--replace", *root)
+    assert "--replace takes its place, --name gives another" in refused(verb, wire, "spawn", HB_BOT, *root, "-x", "5")
+    done(verb, wire, "spawn", HB_BOT, "--name", "Other", "-x", "5", "--namespace", "lab")
+    done(verb, wire, "spawn", HB_BOT, "--name", "hb_bot", "--replace", *root)
 
 
-def test_a_name_that_is_none_is_refused_by_the_sim_too(wire: Wire, sim: Process) -> None:
+def test_a_name_that_is_none_is_refused_by_the_sim_too(verb: Verb, wire: Wire, sim: Process) -> None:
     """A robot called `*` would drive them all; a look-alike letter would pass for another robot's."""
     bus, text = wire.bus(), expand_xacro(Path(HB_BOT))
     for name in ("*", "**", "$*", "a/b", "..", "F\0", "Fred\n", "\u0391nn", "x" * 5000):
@@ -143,45 +146,45 @@ def test_a_name_that_is_none_is_refused_by_the_sim_too(wire: Wire, sim: Process)
         with pytest.raises(ServiceError, match="use a letter, then") as refusal:
             bus.call("spawn_entity", request, si.SpawnEntityReply, timeout=20)
         assert str(refusal.value).isprintable() and len(str(refusal.value)) < 1000, name
-    assert wire.run("list").stdout == ""
+    assert verb(wire, "list").stdout == ""
 
 
-def test_a_robot_that_is_replaced_stays_where_it_was_and_stands(wire: Wire, sim: Process) -> None:
-    done(wire, "spawn", HB_BOT, "--name", "Fred", "-x", "2")
+def test_a_robot_that_is_replaced_stays_where_it_was_and_stands(verb: Verb, wire: Wire, sim: Process) -> None:
+    done(verb, wire, "spawn", HB_BOT, "--name", "Fred", "-x", "2")
     fred = Robot(wire.bus(), "Fred")
     fred.drive(0.5)
-    done(wire, "spawn", HB_BOT, "--name", "Fred", "--replace")
+    done(verb, wire, "spawn", HB_BOT, "--name", "Fred", "--replace")
     after = fred.stands()
     assert place(after)[0] > 2
     assert distance(after, fred.pass_time(0.5)) < 1e-6
 
 
-def test_a_robot_is_not_spawned_into_another_nor_is_one_deleted_for_it(wire: Wire, sim: Process) -> None:
-    done(wire, "spawn", HB_BOT, "--name", "Fred")
-    done(wire, "spawn", HB_BOT, "--name", "Ann", "-x", "5")
-    told = refused(wire, "spawn", HB_BOT, "--name", "Bob", "-x", "0.6")
+def test_a_robot_is_not_spawned_into_another_nor_is_one_deleted_for_it(verb: Verb, wire: Wire, sim: Process) -> None:
+    done(verb, wire, "spawn", HB_BOT, "--name", "Fred")
+    done(verb, wire, "spawn", HB_BOT, "--name", "Ann", "-x", "5")
+    told = refused(verb, wire, "spawn", HB_BOT, "--name", "Bob", "-x", "0.6")
     assert "no room for 'Bob' at x 0.6 y 0: it would be inside 'Fred'; the nearest free place is " in told
     assert told.endswith("; -x, -y and -z choose the place\n")
-    assert "inside 'Ann'" in refused(wire, "spawn", HB_BOT, "--name", "Fred", "--replace", "-x", "5.5")
-    told = refused(wire, "spawn", HB_BOT, "--name", "Fred", "--replace", "--namespace", "Ann")
+    assert "inside 'Ann'" in refused(verb, wire, "spawn", HB_BOT, "--name", "Fred", "--replace", "-x", "5.5")
+    told = refused(verb, wire, "spawn", HB_BOT, "--name", "Fred", "--replace", "--namespace", "Ann")
     assert told == "holozen spawn: Ann/cmd_vel is the key of 'Ann'; delete that one, or use another namespace\n"
-    told = refused(wire, "spawn", HB_BOT, "--name", "Zed", "-x", "20", "-z", "-1")
+    told = refused(verb, wire, "spawn", HB_BOT, "--name", "Zed", "-x", "20", "-z", "-1")
     assert "at x 20 y 0 z -1: it would be 0.96 m below the ground; the lowest free z is -0.04; -x, -y and -z " in told
-    told = refused(wire, "spawn", HB_BOT, "--count", "2", "--grid", "1", "-y", "5")
+    told = refused(verb, wire, "spawn", HB_BOT, "--count", "2", "--grid", "1", "-y", "5")
     assert re.search(
         r"1 of 2 were spawned, without (bot[01]): there is no room for '\1' at .*; .* --grid more than 1 m", told
     )
-    ann, fred, bot = [line.split()[0] for line in done(wire, "list").splitlines()]
+    ann, fred, bot = [line.split()[0] for line in done(verb, wire, "list").splitlines()]
     assert (ann, fred) == ("Ann", "Fred") and bot in ("bot0", "bot1")  # one of the two requests came first
 
 
-def test_a_robot_deleted_while_it_drives_leaves_no_key_alive(wire: Wire, sim: Process) -> None:
+def test_a_robot_deleted_while_it_drives_leaves_no_key_alive(verb: Verb, wire: Wire, sim: Process) -> None:
     bus = wire.bus()
     before = keys(bus)
-    done(wire, "spawn", HB_BOT, "--name", "Fred")
+    done(verb, wire, "spawn", HB_BOT, "--name", "Fred")
     fred = Robot(bus, "Fred")
     fred.drive(0.5)
-    done(wire, "delete", "Fred")
+    done(verb, wire, "delete", "Fred")
     odoms = fred.odom.from_now()
     wait_for(lambda: keys(bus) == before)
     clock = bus.latest("clock", Clock)
@@ -220,11 +223,11 @@ def resident(process: Process) -> int:
 
 
 def test_a_topic_that_the_robots_file_names_is_published_to_by_its_readers_type(
-    wire: Wire, sim: Process, tmp_path: Path
+    verb: Verb, wire: Wire, sim: Process, tmp_path: Path
 ) -> None:
     text = expand_xacro(Path(HB_BOT)).replace("<commandTopic>cmd_vel<", "<commandTopic>go<")
     (tmp_path / "r.urdf").write_text(text)
-    assert done(wire, "spawn", str(tmp_path / "r.urdf"), "--name", "Fred") == "Fred listens on Fred/go\n"
+    assert done(verb, wire, "spawn", str(tmp_path / "r.urdf"), "--name", "Fred") == "Fred listens on Fred/go\n"
     fred = Robot(wire.bus(), "Fred")
     pub = wire.start("topic", "pub", "Fred/go", '{"linear": {"x": 0.3}}')
     fred.odom.next(lambda odom: odom.twist.twist.linear.x > 0.29)
@@ -232,17 +235,17 @@ def test_a_topic_that_the_robots_file_names_is_published_to_by_its_readers_type(
     fred.stands()
 
 
-def test_a_fleet_is_spawned_on_a_grid(wire: Wire, sim: Process) -> None:
-    reported = done(wire, "spawn", HB_BOT, "--count", "5", "--grid", "1.5", "-x", "1")
+def test_a_fleet_is_spawned_on_a_grid(verb: Verb, wire: Wire, sim: Process) -> None:
+    reported = done(verb, wire, "spawn", HB_BOT, "--count", "5", "--grid", "1.5", "-x", "1")
     assert reported == "bot0 .. bot4 listen on bot0/cmd_vel .. bot4/cmd_vel\n"
-    lines = [line.split() for line in done(wire, "list").splitlines()]
+    lines = [line.split() for line in done(verb, wire, "list").splitlines()]
     assert [(name, x, y) for name, _, x, _, y, *_ in lines] == [
         ("bot0", "1.000", "0.000"), ("bot1", "2.500", "0.000"), ("bot2", "4.000", "0.000"), ("bot3", "1.000", "1.500"),
         ("bot4", "2.500", "1.500"),
     ]  # fmt: skip
     assert "5 of these exist already, such as bot0; --name gives another name" in refused(
-        wire, "spawn", HB_BOT, "--count", "6"
+        verb, wire, "spawn", HB_BOT, "--count", "6"
     )
-    assert done(wire, "spawn", HB_BOT, "--count", "1", "--name", "Ann", "-x", "-5").startswith("Ann0 .. Ann0 ")
-    assert wire.run("spawn", HB_BOT, "--count", "2", "--replace").returncode == 2
+    assert done(verb, wire, "spawn", HB_BOT, "--count", "1", "--name", "Ann", "-x", "-5").startswith("Ann0 .. Ann0 ")
+    assert verb(wire, "spawn", HB_BOT, "--count", "2", "--replace").returncode == 2
     Robot(wire.bus(), "bot4").drive(0.3)

@@ -12,6 +12,7 @@ from holozen.messages import TriggerReply, TriggerRequest
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 
+from .conftest import Verb
 from .processes import assert_one_line
 from .robots import Robot, moves, planar
 
@@ -27,16 +28,16 @@ TOPICS = {
 }
 
 
-def test_list_names_every_topic_once(town: Wire, robot: Robot) -> None:
-    assert town.run("topic", "list").stdout.split() == sorted(TOPICS)
-    lines = town.run("topic", "list", "-t").stdout.splitlines()
+def test_list_names_every_topic_once(verb: Verb, town: Wire, robot: Robot) -> None:
+    assert verb(town, "topic", "list").stdout.split() == sorted(TOPICS)
+    lines = verb(town, "topic", "list", "-t").stdout.splitlines()
     assert lines == [f"{key} [{kind}]" for key, kind in sorted(TOPICS.items())]
     hidden = "simulate_steps/_action/feedback"
-    assert hidden in town.run("topic", "list", "--include-hidden-topics").stdout.split()
+    assert hidden in verb(town, "topic", "list", "--include-hidden-topics").stdout.split()
 
 
-def test_info_shows_the_type_and_the_endpoints(town: Wire, robot: Robot) -> None:
-    lines = town.run("topic", "info", "cmd_vel").stdout.splitlines()
+def test_info_shows_the_type_and_the_endpoints(verb: Verb, town: Wire, robot: Robot) -> None:
+    lines = verb(town, "topic", "info", "cmd_vel").stdout.splitlines()
     assert lines[0] == "Type: geometry_msgs/msg/Twist"
     assert lines[1] == "Publisher count: 1"
     assert lines[2].startswith("  test (")
@@ -45,8 +46,8 @@ def test_info_shows_the_type_and_the_endpoints(town: Wire, robot: Robot) -> None
     assert lines[-1].startswith("Obeyed: ")
 
 
-def test_echo_prints_as_ros_does(town: Wire, robot: Robot) -> None:
-    done = town.run("topic", "echo", "/odom", "--once")
+def test_echo_prints_as_ros_does(verb: Verb, town: Wire, robot: Robot) -> None:
+    done = verb(town, "topic", "echo", "/odom", "--once")
     lines = done.stdout.splitlines()
     assert lines[:3] == ["header:", "  stamp:", lines[2]]
     assert lines[2].startswith("    sec: ")
@@ -190,10 +191,10 @@ def test_pub_reads_a_value_from_standard_input(town: Wire, robot: Robot) -> None
 
 @pytest.mark.parametrize(("words", "count"), [(["-1"], 1), (["--times", "5", "--rate", "100"], 5 + STOPS)])
 def test_pub_sends_as_often_as_requested_and_stops_after_more_than_one(
-    town: Wire, robot: Robot, words: list[str], count: int
+    verb: Verb, town: Wire, robot: Robot, words: list[str], count: int
 ) -> None:
     commands = robot.commands.from_now()
-    done = town.run("topic", "pub", "cmd_vel", '{"linear": {"x": 0.3}}', *words)
+    done = verb(town, "topic", "pub", "cmd_vel", '{"linear": {"x": 0.3}}', *words)
     assert done.returncode == 0 or "not obeyed: late" in done.stderr, done.stderr  # on a busy machine
     wait_for(lambda: len(commands.messages()) >= count, what="that many commands")
     robot.stands()
@@ -212,9 +213,11 @@ def test_pub_sends_as_often_as_requested_and_stops_after_more_than_one(
         ("[" * 5000, ""),
     ],
 )
-def test_pub_refuses_what_is_no_command_with_a_reason(town: Wire, robot: Robot, value: str, reason: str) -> None:
+def test_pub_refuses_what_is_no_command_with_a_reason(
+    verb: Verb, town: Wire, robot: Robot, value: str, reason: str
+) -> None:
     commands = robot.commands.from_now()
-    done = town.run("topic", "pub", "cmd_vel", value)
+    done = verb(town, "topic", "pub", "cmd_vel", value)
     assert_one_line(done, 1, "holozen topic pub: cmd_vel: refused: ", reason)
     robot.newest()
     assert commands.all() == []
@@ -226,7 +229,7 @@ def test_pub_refuses_ten_megabytes(town: Wire, robot: Robot) -> None:
     robot.newest()
 
 
-def test_a_wrong_word_is_one_error_line(town: Wire) -> None:
+def test_a_wrong_word_is_one_error_line(verb: Verb, town: Wire) -> None:
     for words, code, reason in [
         (["pub", "*/cmd_vel", "{}"], 1, "'*/cmd_vel': write to one key; a wildcard would move every robot"),
         (["pub", "speed", "{}"], 1, "'speed' has no known type; known keys: cmd_vel, odom, "),
@@ -237,22 +240,22 @@ def test_a_wrong_word_is_one_error_line(town: Wire) -> None:
         (["list", "--cfg", "no/such/path:1"], 1, "no/such/path"),
         (["list", "--config", "nowhere.json5"], 1, "nowhere.json5"),
     ]:
-        assert_one_line(town.run("topic", *words), code, reason)
+        assert_one_line(verb(town, "topic", *words), code, reason)
 
 
 MAP, KEPT = b'{"info": {"width": 3}}', "nav_msgs/msg/OccupancyGrid"
 
 
-def test_echo_shows_first_what_a_latched_key_holds(wire: Wire) -> None:
+def test_echo_shows_first_what_a_latched_key_holds(verb: Verb, wire: Wire) -> None:
     """With a service of the same name beside the publisher, as the sim has for robot_description."""
     writer, server = wire.bus("writer"), wire.bus("server")
     publisher = writer.publisher_raw("map", KEPT, "application/json")
     publisher.put_bytes(MAP)
     server.serve("map", TriggerRequest, TriggerReply, lambda _: TriggerReply(message="no map")).start()
     for flags in ((), ("--qos-durability", "transient_local")):
-        done = wire.run("topic", "echo", "map", "--once", "--timeout", "10", "--json", *flags)
+        done = verb(wire, "topic", "echo", "map", "--once", "--timeout", "10", "--json", *flags)
         assert (done.returncode, json.loads(done.stdout)["info"]["width"]) == (0, 3), done.stderr
-    done = wire.run("topic", "echo", "map", "--once", "--timeout", "0.5", "--qos-durability", "volatile")
+    done = verb(wire, "topic", "echo", "map", "--once", "--timeout", "0.5", "--qos-durability", "volatile")
     assert done.returncode == 1
     assert "no messages on map" in done.stderr
 
@@ -267,9 +270,9 @@ def test_echo_goes_on_after_what_was_latched(wire: Wire) -> None:
     assert [line for line in process.out.splitlines() if line.isdigit()] == ["3", "4"]
 
 
-def test_echo_of_any_key_asks_for_its_last_message_where_that_is_wanted(wire: Wire) -> None:
+def test_echo_of_any_key_asks_for_its_last_message_where_that_is_wanted(verb: Verb, wire: Wire) -> None:
     wire.bus("writer").publisher_raw("note", "std_msgs/msg/String", "application/json").put_bytes(b'{"data": "hi"}')
     transient = ("--qos-durability", "transient_local")
-    done = wire.run("topic", "echo", "note", "--once", "--timeout", "10", "--json", *transient)
+    done = verb(wire, "topic", "echo", "note", "--once", "--timeout", "10", "--json", *transient)
     assert json.loads(done.stdout) == {"data": "hi"}, done.stderr
-    assert wire.run("topic", "echo", "note", "--once", "--timeout", "0.5").returncode == 1
+    assert verb(wire, "topic", "echo", "note", "--once", "--timeout", "0.5").returncode == 1

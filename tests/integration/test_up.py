@@ -2,7 +2,6 @@
 
 import os
 import signal
-import subprocess
 import urllib.error
 import urllib.request
 from collections.abc import Callable
@@ -13,11 +12,10 @@ import pytest
 from holozen import data
 from holozen.testing import Process, Terminal, Wire, wait_for
 
-from .conftest import start_sim
+from .conftest import Verb, start_sim
 from .processes import assert_one_line, parts_at, state_of, wait_for_none
 from .robots import Robot, moves, rests
 
-Verb = Callable[..., subprocess.CompletedProcess[str]]
 BOT = str(data.find("urdf", "hb_bot.urdf.xacro"))
 PARTS = {"sim", "pose-service", "controller"}
 AT_MOST = 10.0  # s; it promises 2, and a busy machine gets more
@@ -31,11 +29,18 @@ def driven(robot: Robot) -> None:
     robot.odom.next(lambda odom: not rests(odom))
 
 
-def test_without_a_terminal_the_controller_drives_the_square(wire: Wire) -> None:
-    up = wire.start("up", "--rtf", "8", "--size", "0.5", "--laps", "1")
+def test_without_a_terminal_the_controller_drives_the_square_and_the_page_of_a_view_ends_with_it(wire: Wire) -> None:
+    up = wire.start("up", "--rtf", "8", "--size", "0.5", "--laps", "1", "--view", "0")
     up.wait_for_line("up: no terminal here, so no teleop; the rest runs until Ctrl-C or SIGTERM")
     up.wait_for_line("lap 1 goal 3: (0.00, 0.00, 0 deg)", within=40)
     assert set(parts_at(wire)) >= {"up", "sim", "pose-service"}
+    address = up.wait_for_line("http://127.0.0.1:").split()[-1]
+    with urllib.request.urlopen(address) as page:
+        assert b"viser" in page.read()
+    assert up.terminate(AT_MOST) == 0
+    assert parts_at(wire) == {}
+    with pytest.raises(urllib.error.URLError):
+        urllib.request.urlopen(address)
     assert "Traceback" not in up.err
 
 
@@ -79,13 +84,6 @@ def test_a_part_that_hangs_is_killed_and_reported(wire: Wire) -> None:
     assert up.wait(AT_MOST) == 0
     assert parts_at(wire) == {}
     assert "up: sim did not end within 0.5 s and was killed" in up.err
-
-
-def test_killed_it_leaves_nothing(wire: Wire) -> None:
-    up = wire.start("up")
-    all_run(wire, PARTS)
-    up.kill()
-    wait_for_none(wire)
 
 
 def test_in_a_terminal_it_shows_the_teleop_and_ctrl_c_ends_all(wire: Wire) -> None:
@@ -166,11 +164,15 @@ def test_a_wrong_flag_is_one_line_and_nothing_starts(wire: Wire, verb: Verb) -> 
         assert_one_line(verb(wire, "up", *words), 2, "holozen up: ", reason)
 
 
-def test_of_several_robots_the_first_is_driven_by_its_name_in_the_engine_of_ones_choice(wire: Wire) -> None:
-    wire.start("up", "--robot", f"{BOT}=Fred", "--robot", f"{BOT}=Ann", "--engine", "mujoco")
+def test_of_several_robots_the_first_is_driven_in_the_engine_of_ones_choice_and_killed_it_leaves_nothing(
+    wire: Wire,
+) -> None:
+    up = wire.start("up", "--robot", f"{BOT}=Fred", "--robot", f"{BOT}=Ann", "--engine", "mujoco")
     driven(Robot(wire.bus(), "Fred"))
     Robot(wire.bus(), "Ann").stands()
-    assert "mujoco" in Path(f"/proc/{parts_at(wire)['sim']}/maps").read_text()
+    assert "mujoco" in Path(f"/proc/{all_run(wire, PARTS)['sim']}/maps").read_text()
+    up.kill()
+    wait_for_none(wire)
 
 
 def test_a_killed_sim_is_reported_and_one_started_by_hand_joins_the_others(wire: Wire) -> None:
@@ -219,14 +221,3 @@ def test_a_part_that_keeps_dying_is_started_less_and_less_often(wire: Wire) -> N
         wait_for(lambda number=number: up.err.count("4 goals from square") == number)  # type: ignore[misc]
         os.kill(parts_at(wire)["pose-service"], signal.SIGKILL)
         up.wait_for_line(f"up: pose-service was ended by signal 9; starting it again in {pause} s")
-
-
-def test_with_a_view_the_page_is_there_and_ends_with_it(wire: Wire) -> None:
-    up = wire.start("up", "--view", "0")
-    address = up.wait_for_line("http://127.0.0.1:").split()[-1]
-    with urllib.request.urlopen(address) as page:
-        assert b"viser" in page.read()
-    assert up.terminate(AT_MOST) == 0
-    assert parts_at(wire) == {}
-    with pytest.raises(urllib.error.URLError):
-        urllib.request.urlopen(address)

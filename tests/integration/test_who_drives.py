@@ -9,6 +9,7 @@ from holozen.testing import Process, Wire, wait_for
 from holozen.transport.errors import ServiceError
 from holozen.wire import COMMAND_SILENCE, PRIORITY_OF
 
+from .conftest import Verb
 from .robots import Robot, moves, rests
 
 PERSON, SCRIPT, AUTOPILOT = "INTERACTIVE_HIGH", "DATA", "DATA_LOW"
@@ -194,16 +195,16 @@ def test_a_stop_of_a_person_stops_a_driving_autopilot(robot: Robot, person: Hand
     refused(robot, autopilot, "overruled")
 
 
-def test_controller_resume_reports_the_sims_reply(town: Wire, robot: Robot, person: Hand) -> None:
+def test_controller_resume_reports_the_sims_reply(verb: Verb, town: Wire, robot: Robot, person: Hand) -> None:
     drive(robot, person, 0.3)
     robot.stands()
-    done = town.run("controller", "--resume")
+    done = verb(town, "controller", "--resume")
     assert (done.returncode, done.stderr) == (0, "every source may drive\n")
     assert not robot.status().held
 
 
-def test_controller_resume_without_a_sim_reports_it(wire: Wire) -> None:
-    done = wire.run("controller", "--resume")
+def test_controller_resume_without_a_sim_reports_it(verb: Verb, wire: Wire) -> None:
+    done = verb(wire, "controller", "--resume")
     assert done.returncode == 1
     assert done.stderr.startswith("controller: no reply from 'resume' within 5 s")
     assert done.stderr.count("\n") == 1

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import fidelity
 from holozen.flags import ENGINES
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -85,6 +84,8 @@ def test_fidelity_compares_each_drive_with_its_command(
     capsys: pytest.CaptureFixture[str],
     trials: Callable[[int, int], int],
 ) -> None:
+    from benchmarks import fidelity  # here, as it reads its robots
+
     runs = [(fidelity.ROBOTS, fidelity.MOTIONS)]
     if not trials(0, 1):  # one motion of all that a drive can do: the others are parts of it
         runs = [

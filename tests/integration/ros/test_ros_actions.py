@@ -9,6 +9,8 @@ import pytest
 
 from holozen.testing import Process, Wire
 
+from ..conftest import Verb
+
 SERVER = """
 import time
 
@@ -213,11 +215,11 @@ def test_a_server_that_dies_ends_its_goals(wire: Wire, scripts: Path) -> None:
     assert verb.err.splitlines()[-1].endswith("the server of 'fibonacci' has left before the end of the goal")
 
 
-def test_the_verbs_list_it_and_send_it_goals(town: Wire) -> None:
-    assert "fibonacci [example_interfaces/action/Fibonacci]" in town.run("action", "list", "-t").stdout
-    shown = json.loads(town.run("action", "info", "fibonacci", "--json").stdout)
+def test_the_verbs_list_it_and_send_it_goals(verb: Verb, town: Wire) -> None:
+    assert "fibonacci [example_interfaces/action/Fibonacci]" in verb(town, "action", "list", "-t").stdout
+    shown = json.loads(verb(town, "action", "info", "fibonacci", "--json").stdout)
     assert [one["node"] for one in shown["servers"]] == ["fibonacci_action_server"]
-    done = town.run("action", "send_goal", "/fibonacci", "example_interfaces/Fibonacci", "{order: 3}", "-f", "--json")
+    done = verb(town, "action", "send_goal", "/fibonacci", "example_interfaces/Fibonacci", "{order: 3}", "-f", "--json")
     first, *progress, last = map(json.loads, done.stdout.splitlines())
     assert first["accepted"]
     assert progress == [{"feedback": {"sequence": [0, 1, 1]}}, {"feedback": {"sequence": [0, 1, 1, 2]}}]
@@ -228,11 +230,11 @@ def test_the_verbs_list_it_and_send_it_goals(town: Wire) -> None:
         ("{ordr: 3}", "no field 'ordr' (did you mean 'order'?)"),
         ("{order: x}", "'x' is not a valid int32"),
     ):
-        refused = town.run("action", "send_goal", "fibonacci", goal)
+        refused = verb(town, "action", "send_goal", "fibonacci", goal)
         assert refused.returncode == 1
         assert reason in refused.stderr
         assert len(refused.stderr.splitlines()) == 1
-    other = town.run("action", "send_goal", "fibonacci", "nav2_msgs/NavigateToPose", "{}")
+    other = verb(town, "action", "send_goal", "fibonacci", "nav2_msgs/NavigateToPose", "{}")
     assert "its type is example_interfaces/action/Fibonacci, not nav2_msgs/action/NavigateToPose" in other.stderr
 
 
@@ -263,7 +265,9 @@ rclpy.spin(Turner())
 
 
 @pytest.mark.parametrize("form", ["json", "msgpack", "cdr"])
-def test_an_action_of_a_package_is_known_to_who_does_not_have_it(form: str, wire: Wire, tmp_path: Path) -> None:
+def test_an_action_of_a_package_is_known_to_who_does_not_have_it(
+    verb: Verb, form: str, wire: Wire, tmp_path: Path
+) -> None:
     files = {
         "package.xml": "<package><name>turner</name></package>",
         "action/Turn.action": "float64 angle\n---\nbool done\ngeometry_msgs/Point at\n---\nfloat64 left\n",
@@ -273,12 +277,12 @@ def test_an_action_of_a_package_is_known_to_who_does_not_have_it(form: str, wire
         (tmp_path / "turner" / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "turner" / name).write_text(text)
     wire.start("run", "--wire", form, str(tmp_path / "turner" / "scripts" / "turn.py")).wait_for_line("ready")
-    done = wire.run("action", "send_goal", "turn", "{angle: 1.5}", "--feedback", "--json")
+    done = verb(wire, "action", "send_goal", "turn", "{angle: 1.5}", "--feedback", "--json")
     assert [json.loads(line) for line in done.stdout.splitlines()[1:]] == [
         {"feedback": {"left": 0.75}},
         {"status": "SUCCEEDED", "result": {"done": True, "at": {"x": 1.5, "y": 0.0, "z": 0.0}}},
     ], done.stderr
-    assert "(did you mean 'angle'?)" in wire.run("action", "send_goal", "turn", "{angl: 1.5}").stderr
+    assert "(did you mean 'angle'?)" in verb(wire, "action", "send_goal", "turn", "{angl: 1.5}").stderr
 
 
 def test_a_signal_to_the_verb_cancels_its_goal(town: Wire) -> None:

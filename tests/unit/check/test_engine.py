@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from holozen.check.engine import Finding
 from holozen.check.report import check
 from holozen.check.rules_xml import PLUGIN, URDF
 from holozen.check.spelling import distance, nearest
@@ -32,13 +33,13 @@ USE = (
 )
 
 
-def places(path: Path) -> list[tuple[str, str, int]]:
-    return [(finding.rule, Path(finding.place.file).name, finding.place.line) for finding in check(path)[0]]
+def places(found: list[Finding]) -> list[tuple[str, str, int]]:
+    return [(finding.rule, Path(finding.place.file).name, finding.place.line) for finding in found]
 
 
-def test_a_line_in_a_macro_and_one_in_its_call(findings: Findings, tmp_path: Path) -> None:
-    findings(HEAD + WHEELS + USE, "r.xacro")
-    assert [(rule, line) for rule, _, line in places(tmp_path / "r.xacro")] == [("attribute", 6), ("attribute", 11)]
+def test_a_line_in_a_macro_and_one_in_its_call(findings: Findings) -> None:
+    found = findings(HEAD + WHEELS + USE, "r.xacro")
+    assert [(rule, line) for rule, _, line in places(found)] == [("attribute", 6), ("attribute", 11)]
 
 
 def test_a_name_that_a_macro_uses_twice_has_the_lines_of_both_calls(findings: Findings, tmp_path: Path) -> None:
@@ -60,15 +61,14 @@ def test_a_line_in_an_included_file(findings: Findings, tmp_path: Path) -> None:
     (tmp_path / "parts").mkdir()
     (tmp_path / "parts" / "wheels.xacro").write_text(HEAD + WHEELS + "</robot>")
     for include in ("$(find mine)/parts/wheels.xacro", "parts/wheels.xacro"):
-        findings(HEAD + f'<xacro:include filename="{include}"/>\n' + USE, "r.xacro")
-        assert places(tmp_path / "r.xacro") == [("attribute", "r.xacro", 4), ("attribute", "wheels.xacro", 6)]
+        found = findings(HEAD + f'<xacro:include filename="{include}"/>\n' + USE, "r.xacro")
+        assert places(found) == [("attribute", "r.xacro", 4), ("attribute", "wheels.xacro", 6)]
 
 
 def test_a_line_that_cannot_be_traced_is_one_of_the_expanded_text(findings: Findings, tmp_path: Path) -> None:
     (tmp_path / "wheels.xacro").write_text(HEAD + WHEELS + "</robot>")
     computed = '<xacro:arg name="f" default="wheels"/><xacro:include filename="$(arg f).xacro"/>\n'
-    findings(HEAD + computed + USE, "r.xacro")
-    found = check(tmp_path / "r.xacro")[0]
+    found = findings(HEAD + computed + USE, "r.xacro")
     assert [finding.place.expanded for finding in found] == [False, True, True]
     assert "line of `holozen xacro`'s output" in str(found[1])
 
@@ -125,7 +125,7 @@ def test_an_include_of_another_machine_is_a_finding_and_its_lines_are_known(find
     found = findings(HEAD + include + USE, "r.xacro")
     note = next(finding for finding in found if finding.rule == "load-note")
     assert "; write wheels.xacro" in note.problem and note.place.line == 2
-    assert ("attribute", "wheels.xacro", 6) in places(tmp_path / "r.xacro")
+    assert ("attribute", "wheels.xacro", 6) in places(found)
 
 
 def test_a_file_for_others_to_include_is_no_robot_and_no_mistake(rules: Callable[..., list[str]]) -> None:

@@ -1,11 +1,11 @@
 """A sim that only keeps what it receives."""
 
 from collections.abc import Callable
+from subprocess import CompletedProcess
 from typing import TypeVar
 
 import pytest
 
-from holozen import cli
 from holozen.messages import Point, Pose, PoseStamped, Quaternion
 from holozen.messages import simulation_interfaces as si
 from holozen.testing import Wire
@@ -70,14 +70,11 @@ def sim(wire: Wire) -> FakeSim:
 
 
 @pytest.fixture
-def run(wire: Wire, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+def run(wire: Wire, call: Callable[..., CompletedProcess[str]]) -> Callable[..., tuple[int, str, str]]:
     """Run `holozen VERB WORDS...` in this process: exit code, output, errors."""
 
     def run(*words: object) -> tuple[int, str, str]:
-        try:
-            code = cli.main([*map(str, words), *wire.flags])
-        except SystemExit as end:
-            code = int(end.code or 0)
-        return code, *capsys.readouterr()
+        done = call(*map(str, words), *wire.flags)
+        return done.returncode, done.stdout, done.stderr
 
     return run

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,12 @@ def run(home: Path, wire: Wire) -> Run:
         return subprocess.run(line, capture_output=True, text=True, timeout=60, env=environment(**env))
 
     return run
+
+
+@pytest.fixture
+def refuse(home: Path, wire: Wire, call: Run) -> Run:
+    """As `run`, in this process: for what is refused before any script runs."""
+    return partial(call, "run", *wire.flags)
 
 
 def environment(**more: str) -> dict[str, str]:
@@ -68,8 +75,8 @@ def test_it_has_what_python_gives_every_script(run: Run, write: Write) -> None:
         ("robot_state_publisher robot_state_publisher", "the sim itself publishes joint_states and tf"),
     ],
 )
-def test_of_what_is_ros_own_it_names_the_verb(run: Run, words: str, expected: str) -> None:
-    done = run(*words.split())
+def test_of_what_is_ros_own_it_names_the_verb(refuse: Run, words: str, expected: str) -> None:
+    done = refuse(*words.split())
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith("holozen run: ") and done.stderr.endswith(f"{expected}\n")
     assert done.stderr.count("\n") == 1
@@ -174,7 +181,7 @@ def test_a_name_that_is_not_there_is_reported_in_the_users_traceback(run: Run, w
     assert "Twist" in done.stderr.splitlines()[-1]
 
 
-def test_what_is_not_there_is_one_line(run: Run, write: Write, my_bot: Path) -> None:
+def test_what_is_not_there_is_one_line(refuse: Run, write: Write, my_bot: Path) -> None:
     for words, message in [
         (["controller"], "controller does not exist (did you mean 'controller.py'?)"),
         (["controller.pyy"], "controller.pyy does not exist (did you mean 'controller.py'?)"),
@@ -185,16 +192,18 @@ def test_what_is_not_there_is_one_line(run: Run, write: Write, my_bot: Path) -> 
         (["my_bot"], "give an executable; executables in "),
     ]:
         write("controller.py")
-        done = run(*words)
+        done = refuse(*words)
         assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
         assert message in done.stderr
         assert done.stderr.startswith("holozen run: ")
 
 
-def test_a_flag_of_ours_behind_the_script_is_checked_unless_the_script_has_it(run: Run, write: Write) -> None:
+def test_a_flag_of_ours_behind_the_script_is_checked_unless_the_script_has_it(
+    run: Run, refuse: Run, write: Write
+) -> None:
     write("a.py", "import sys; print(sys.argv[1:])")
     for value in ("hb", "hb=/nope"):
-        done = run("a.py", "--package", value)
+        done = refuse("a.py", "--package", value)
         assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
         assert done.stderr.startswith(f"holozen run: argument --package: '{value}'")
     write("b.py", "import sys; print(sys.argv[1:])  # --package")

@@ -4,13 +4,15 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from holozen.messages import Clock, TFMessage
 from holozen.messages.codec import decode
+from holozen.ros import importer
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.samples import Sample
 
@@ -44,18 +46,25 @@ def launch(my_bot: Path, wire: Wire) -> Launch:
     return launch
 
 
+@pytest.fixture
+def refuse(my_bot: Path, wire: Wire, call: Launch) -> Iterator[Launch]:
+    """As `launch`, in this process: for what starts none of the others."""
+    yield partial(call, "launch", *wire.flags)
+    importer.remove()
+
+
 def described(*entities: str) -> str:
     return f"{HEAD}\ndef generate_launch_description():\n    return LaunchDescription([{', '.join(entities)}])\n"
 
 
-def test_a_launch_file_with_components_or_missing_modules_gets_a_hint(launch: Launch, write: Write) -> None:
+def test_a_launch_file_with_components_or_missing_modules_gets_a_hint(refuse: Launch, write: Write) -> None:
     for imported, hint in [
         ("from launch_ros.actions import ComposableNodeContainer", "start a Python script as a separate Node for each"),
         ("from launch_ros.descriptions import ComposableNode", "start a Python script as a separate Node for each"),
         ("import interactive_markers.interactive_marker_server", "there are no interactive markers here"),
     ]:
         path = write("a.launch.py", f"import os\n{imported}\n")
-        done = launch(str(path))
+        done = refuse(str(path))
         assert done.stderr.startswith(f"holozen launch: {path}:2: ")
         assert hint in done.stderr
         assert done.stderr.count("\n") == 1
@@ -74,28 +83,28 @@ def test_gazebos_own_launch_files_start_the_sim(my_bot: Path, wire: Wire, words:
     assert "does not use" not in launch.err
 
 
-def test_gazebos_own_launch_files_take_a_world(launch: Launch) -> None:
-    done = launch("gazebo_ros", "gazebo.launch.py", "world:=nowhere.world")
+def test_gazebos_own_launch_files_take_a_world(refuse: Launch) -> None:
+    done = refuse("gazebo_ros", "gazebo.launch.py", "world:=nowhere.world")
     assert done.returncode == 1
     assert "nowhere.world" in done.stderr
 
 
-def test_a_wrong_name_of_gazebos_launch_files_gets_the_closest(launch: Launch) -> None:
+def test_a_wrong_name_of_gazebos_launch_files_gets_the_closest(refuse: Launch) -> None:
     for words, expected in [
         (["gazebo_ros", "gazeboo.launch.py"], "'gazeboo.launch.py' (did you mean 'gazebo.launch.py'?)"),
         (["ros_gz_sim", "qqqq.py"], "'qqqq.py'; there are gz_sim.launch.py"),
     ]:
-        done = launch(*words)
+        done = refuse(*words)
         assert (done.returncode, done.stderr.count("\n")) == (1, 1)
         start = f"holozen launch: {words[0]}, which holozen replaces, has no launch file"
         assert done.stderr == f"{start} {expected}\n"
 
 
-def test_gazebo_in_a_launch_file_is_refused_beside_another_sim(launch: Launch, write: Write, wire: Wire) -> None:
+def test_gazebo_in_a_launch_file_is_refused_beside_another_sim(refuse: Launch, write: Write, wire: Wire) -> None:
     wire.bus("sim").publisher("clock", Clock)
     gazebo = "ExecuteProcess(cmd=['gazebo', 'empty.world'])"
     path = write("a.launch.py", described(gazebo, "ExecuteProcess(cmd=['echo', 'started'])"))
-    done = launch(str(path))
+    done = refuse(str(path))
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
     assert done.stderr.startswith(f"holozen launch: {path}:8: sim@")
     assert done.stderr.endswith(" simulates here already; end it, or leave Gazebo out of the launch file to use it\n")
@@ -125,11 +134,11 @@ def test_a_node_runs_with_its_words(launch: Launch, write: Write) -> None:
         assert done.returncode == 0
 
 
-def test_show_args_lists_the_arguments_and_starts_nothing(launch: Launch, write: Write) -> None:
+def test_show_args_lists_the_arguments_and_starts_nothing(refuse: Launch, write: Write) -> None:
     gui = "DeclareLaunchArgument('gui', default_value=PathJoinSubstitution(['a', 'b']), choices=['a', 'b'])"
     others = "DeclareLaunchArgument('world')", "ExecuteProcess(cmd=['false'])"
     write("a.launch.py", described(*ARGUMENTS, f"GroupAction([{gui}])", *others))
-    done = launch("-s", "a.launch.py")
+    done = refuse("-s", "a.launch.py")
     lines = [
         "kp:= how eager (default: 1.5)",
         "gui:= (default: <a/b>; one of a, b)",
@@ -137,14 +146,14 @@ def test_show_args_lists_the_arguments_and_starts_nothing(launch: Launch, write:
     ]
     assert (done.returncode, done.stdout.splitlines(), done.stderr) == (0, lines, "")
     write("a.launch.py", described())
-    done = launch("a.launch.py", "--show-args", "--noninteractive", "-d", "-a")  # of which only the first does anything
+    done = refuse("a.launch.py", "--show-args", "--noninteractive", "-d", "-a")  # of which only the first does anything
     assert (done.stdout, done.stderr) == ("it has no arguments\n", "")
 
 
-def test_a_value_that_nothing_uses_is_reported(launch: Launch, write: Write) -> None:
+def test_a_value_that_nothing_uses_is_reported(refuse: Launch, write: Write) -> None:
     write("a.launch.py", described(*ARGUMENTS))
     message = "holozen launch: a.launch.py does not use 'kpp' (did you mean 'kp'?)\n"
-    assert (launch("a.launch.py", "kpp:=3").stderr) == message
+    assert (refuse("a.launch.py", "kpp:=3").stderr) == message
 
 
 NAP = "ExecuteProcess(cmd=['sleep', '60'])"
@@ -174,14 +183,14 @@ def test_a_value_that_may_be_used_later_is_not_reported(launch: Launch, write: W
         assert "kpp" not in launch("a.launch.py", "kpp:=3").stderr.replace("launch: x", "")
 
 
-def test_a_launch_file_of_a_package_in_xml_is_not_read(launch: Launch, write: Write) -> None:
+def test_a_launch_file_of_a_package_in_xml_is_not_read(refuse: Launch, write: Write) -> None:
     write("src/my_bot/launch/a.launch.xml", "<launch/>")
-    done = launch("my_bot", "a.launch.xml")
+    done = refuse("my_bot", "a.launch.xml")
     assert (done.returncode, done.stderr.count("\n")) == (1, 1)
     assert "a.launch.xml: launch files are in Python here; write a.launch.py, with a Node(package=..., " in done.stderr
 
 
-def test_what_cannot_be_followed_is_one_line(launch: Launch, write: Write) -> None:
+def test_what_cannot_be_followed_is_one_line(refuse: Launch, write: Write) -> None:
     for text, message in [
         ("from launch.actions import ExecuteLocal", "a.launch.py:1: launch.actions has no 'ExecuteLocal' here"),
         ("import launch.frontend", "a.launch.py:1: launch has no 'frontend' here"),
@@ -219,13 +228,13 @@ def test_what_cannot_be_followed_is_one_line(launch: Launch, write: Write) -> No
         ("", "/a.launch.py has no function generate_launch_description()"),
     ]:
         write("a.launch.py", text)
-        done = launch(str(Path("a.launch.py").absolute()))
+        done = refuse(str(Path("a.launch.py").absolute()))
         assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
         assert done.stderr.startswith("holozen launch: ")
         assert message in done.stderr
 
 
-def test_a_file_that_is_not_there_is_one_line(launch: Launch) -> None:
+def test_a_file_that_is_not_there_is_one_line(refuse: Launch) -> None:
     for words, code, message in [
         (["b.launch.py"], 1, "b.launch.py does not exist, and there are no launch files in that folder"),
         (["my_bot", "b.launch.py"], 1, "no launch file 'b.launch.py' in "),
@@ -237,7 +246,7 @@ def test_a_file_that_is_not_there_is_one_line(launch: Launch) -> None:
         (["a", "b", "c"], 2, "give FILE, or PACKAGE FILE, not 'a b c'"),
         (["x:=1"], 2, "give FILE, or PACKAGE FILE, not 'nothing'"),
     ]:
-        done = launch(*words)
+        done = refuse(*words)
         assert (done.returncode, done.stderr.count("\n")) == (code, 1)
         assert message in done.stderr
 
