@@ -23,6 +23,7 @@ import pytest
 
 from holozen import cli
 from holozen.process import SIGNALS, Ending
+from holozen.testing.process import PATIENCE
 
 HERE = Path(__file__).parent
 PACKAGES = dict(line.split(" ", 1) for line in (HERE / "packages.txt").read_text().splitlines())
@@ -87,15 +88,25 @@ def trials() -> Callable[[int, int], int]:
 
 @pytest.fixture
 def call(capfd: pytest.CaptureFixture[str]) -> Generator[Callable[..., subprocess.CompletedProcess[str]], None, None]:
-    """`call("topic", "list")`: run `holozen topic list` in this process. For what verbs write, which needs no other."""
-    handlers = {number: signal.getsignal(number) for number in (*SIGNALS, signal.SIGTSTP)}
+    """`call("topic", "list")`: run `holozen topic list` in this process. For what verbs write, which needs no other.
+    An AssertionError ends one that goes on for PATIENCE.
+    """
+    handlers = {number: signal.getsignal(number) for number in (*SIGNALS, signal.SIGTSTP, signal.SIGALRM)}
+
+    def late(_number: int, _frame: object) -> None:
+        raise AssertionError(f"it still runs after {PATIENCE:g} s")
+
+    signal.signal(signal.SIGALRM, late)
 
     def run(*words: str) -> subprocess.CompletedProcess[str]:
         capfd.readouterr()
+        signal.setitimer(signal.ITIMER_REAL, PATIENCE)
         try:
             code = cli.main([*words])
         except SystemExit as end:
             code = int(end.code or 0)
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0)
         return subprocess.CompletedProcess(words, code, *capfd.readouterr())
 
     yield run

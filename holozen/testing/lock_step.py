@@ -31,7 +31,7 @@ class LockStep:
 
         self.process = wire.start("sim", "--paused", *flags)
         # Another sim that is here already would answer in its place, and this one ends.
-        self.process.wait_for_line(f"listens on {key_for('cmd_vel', robot)}", PATIENCE)
+        self.process.wait_for_line(f"{robot} listens on", PATIENCE)
         self.bus = wire.bus("lock_step")
         self._times = self.bus.subscribe("simulation_status", SimulationStatus)
         self._odoms = self.bus.subscribe(key_for("odom", robot), Odometry)
@@ -67,6 +67,7 @@ class LockStep:
         self._wait(lambda: self._commands.matched, "a robot that listens")
         refusal = HELD_UP[0]
         while refusal.startswith(HELD_UP):
+            self._obeyed = _newest(self._statuses) or self._obeyed  # others may have commanded
             accepted, count = self._obeyed.accepted, _count(self._obeyed)
             self._commands.put(Twist.planar(x, y, turn))
             self._wait(partial(self._is_read, count), "the robot to read its command")

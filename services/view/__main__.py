@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from .playback import Playback
 
 PORT, FOXGLOVE_PORT = 8080, 8765
+RESTING = 0.5  # s between two requests for the scene while no page is open
 NO_TOKEN = "none"
 ALL = ("0.0.0.0", "::")  # addresses that listen on every interface
 
@@ -225,7 +226,6 @@ def _show(
         drivers.close(client.client_id)
         if page := pages.pop(client.client_id, None):
             page.close()
-        drivers.keep([page.driver for page in pages.values()])
 
     async def draw(now: float, news: News) -> None:
         scene.draw(now, news, {page.robot: driver for page in pages.values() if (driver := page.driver)})
@@ -238,11 +238,10 @@ def _show(
     try:
         while not stop.is_set():
             now = time.monotonic()
-            if pages:  # else the sims have nothing to do for it
-                asyncio.run_coroutine_threadsafe(draw(now, scene.ask()), server.get_event_loop()).result()
-            else:
+            asyncio.run_coroutine_threadsafe(draw(now, scene.ask()), server.get_event_loop()).result()
+            if not pages:
                 scene.rest()
-            stop.wait(max(0.0, scene.frame - (time.monotonic() - now)))
+            stop.wait(max(0.0, (scene.frame if pages else RESTING) - (time.monotonic() - now)))
     finally:
         drivers.halt()
         scene.close()

@@ -191,7 +191,7 @@ class Scene:
             self._follow(watched)
 
     def rest(self) -> None:
-        """No page is open: the next frame is the first one whose time counts."""
+        """No page is open: for the rate only the next frames count."""
         self._times.clear()
 
     def close(self) -> None:

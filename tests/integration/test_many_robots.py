@@ -142,7 +142,7 @@ def test_a_second_sim_only_joins_with_named_robots_and_then_both_are_one_world_t
         (["--join"], "name the robots: holozen sim --join --robot FILE=NAME"),
         (["--join", "--robot", f"{BOT}=Ann", "--robot", str(BOT)], "name the robots: "),
     ]:
-        done = verb(wire, "sim", *words)
+        done = wire.run("sim", *words)
         assert_one_line(done, 1, "sim: sim@", f" simulates here already; {why}")
     second = start_sim(wire, "--join", "--robot", f"{BOT}=Ann")
     assert [line.split()[0] for line in verb(wire, "list").stdout.splitlines()] == ["Ann", "Fred"]

@@ -52,10 +52,10 @@ def test_a_new_controller_passes_the_test_that_comes_with_it(run: Verb) -> None:
     assert "1 passed" in done.stdout, done.stdout + done.stderr
 
 
-def test_a_new_package_has_a_message_and_a_service(new: Verb, call: Verb) -> None:
+def test_a_new_package_has_a_message_and_a_service(new: Verb, run: Verb) -> None:
     assert new("package", "our_msgs").returncode == 0
     for name, field in (("our_msgs/msg/Battery", "float32 voltage"), ("our_msgs/srv/NextGoal", "int32 request_goal")):
-        assert field in call("interface", "show", name).stdout
+        assert field in run(*command("interface", "show", name)).stdout
 
 
 def test_what_is_there_is_left_as_it_is(new: Verb, tmp_path: Path) -> None:
