@@ -123,18 +123,23 @@ class Display:
                 self._handles.append(self._client.gui.add_image(pixels, label=self._key, format="jpeg"))
 
     def _draw(self, message: Any, at: Transform) -> None:
-        add = self._client.scene
         if isinstance(message, LaserScan | PointCloud2):
-            points = scan_points(message) if isinstance(message, LaserScan) else cloud_points(message)
-            handle: Any = add.add_point_cloud(self._path, points, RED, point_size=POINT, precision="float32")
+            points, color = scan_points(message) if isinstance(message, LaserScan) else cloud_points(message), RED
         elif isinstance(message, Range):
-            handle = add.add_line_segments(self._path, segments(fan(message)), BLUE, thickness=LINE)
+            points, color = segments(fan(message)), BLUE
         elif isinstance(message, Path):
             line = [(one.pose.position.x, one.pose.position.y, one.pose.position.z) for one in message.poses]
-            handle = add.add_line_segments(self._path, segments(np.array(line)), GREEN, thickness=LINE)
+            points, color = segments(np.array(line)), GREEN
         else:
-            handle = add.add_line_segments(self._path, segments(ellipse(message)), YELLOW, thickness=LINE)
-        self._handles = [handle]  # it replaces the last one, which has the same name
+            points, color = segments(ellipse(message)), YELLOW
+        add = self._client.scene
+        if self._handles:  # a new node would begin to be shown again, and never be if the next one replaced it
+            self._handles[0].points = points
+        elif points.ndim == 2:
+            cloud = add.add_point_cloud(self._path, points, color, point_size=POINT, precision="float32")
+            self._handles.append(cloud)
+        else:
+            self._handles.append(add.add_line_segments(self._path, points, color, thickness=LINE))
         self._put(at)
 
 

@@ -4,11 +4,15 @@ import io
 import math
 import struct
 from array import array
+from types import SimpleNamespace
+from typing import cast
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 from PIL import Image as Picture
 
+from holozen.frames import RobotFrames
 from holozen.messages import (
     CompressedImage,
     Image,
@@ -21,7 +25,9 @@ from holozen.messages import (
     PoseWithCovariance,
     Range,
 )
-from services.view.displays import cloud_points, decompressed, ellipse, fan, picture, scan_points
+from holozen.rotation import Transform
+from holozen.testing import Wire, wait_for
+from services.view.displays import Display, cloud_points, decompressed, ellipse, fan, picture, scan_points
 from services.view.plots import fields
 
 
@@ -117,3 +123,21 @@ def test_a_covariance_is_an_ellipse_of_one_standard_deviation() -> None:
 def test_the_number_fields_of_a_message_have_paths() -> None:
     message = {"pose": {"x": 1.0, "name": "a"}, "ranges": [1, 2], "held": False, "none": None}
     assert list(fields(message)) == ["pose.x", "ranges[0]", "ranges[1]", "held"]
+
+
+def test_a_topic_is_one_node_of_the_page_which_follows_its_messages(wire: Wire) -> None:
+    """A page that draws slowly never shows a node that is replaced more often."""
+    scans, client = wire.bus("lidar").publisher("scan", LaserScan), MagicMock()
+    frames = cast("RobotFrames", SimpleNamespace(of=lambda *_: Transform()))
+    display = Display(client, MagicMock(), wire.bus("view"), frames, "/bot", "", "scan", LaserScan.ROS)
+    add = client.scene.add_point_cloud
+
+    def shows(points: int) -> bool:
+        scans.put(LaserScan(range_max=5.0, ranges=[1.0] * points))
+        display.update()
+        return add.called and len(add.return_value.points) == points
+
+    wait_for(lambda: shows(2))
+    wait_for(lambda: shows(3))
+    assert add.call_count == 1
+    display.close()
