@@ -58,28 +58,28 @@ def test_it_has_what_python_gives_every_script(run: Run, write: Write) -> None:
     assert run("a.py").stdout == plain.stdout
 
 
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
-        ("tf2_ros tf2_echo odom base_link 2", "tf2_ros tf2_echo is not run here: use `holozen tf echo odom base_link`"),
-        ("tf2_ros tf2_echo odom --ros-args -r a:=b", "use `holozen tf echo odom`"),
-        ("xacro xacro my_bot.xacro name:=x", "use `holozen xacro my_bot.xacro name:=x`"),
-        ("teleop_twist_keyboard teleop_twist_keyboard", "use `holozen teleop`"),
-        ("rviz2 rviz2 -d a.rviz", "use `holozen view` or `holozen map`"),
-        ("rviz2", "rviz2 is not run here: use `holozen view` or `holozen map`"),
-        ("gazebo_ros spawn_model -urdf -model Fred -file a.urdf", "use `holozen spawn -urdf -model Fred -file a.urdf`"),
-        ("gazebo_ros gzserver", "use `holozen sim --empty`"),
-        ("gazebo_ros gzclient", "use `holozen view` or `holozen map`"),
-        ("tf2_tools view_frames", "tf2_tools view_frames is not run here: use `holozen view` or `holozen tf echo`"),
-        ("demo_nodes_cpp talker", "use `holozen topic pub chatter std_msgs/msg/String '{data: Hello}'`"),
-        ("robot_state_publisher robot_state_publisher", "the sim itself publishes joint_states and tf"),
-    ],
-)
-def test_of_what_is_ros_own_it_names_the_verb(refuse: Run, words: str, expected: str) -> None:
-    done = refuse(*words.split())
-    assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.startswith("holozen run: ") and done.stderr.endswith(f"{expected}\n")
-    assert done.stderr.count("\n") == 1
+ROS_OWN = [
+    ("tf2_ros tf2_echo odom base_link 2", "tf2_ros tf2_echo is not run here: use `holozen tf echo odom base_link`"),
+    ("tf2_ros tf2_echo odom --ros-args -r a:=b", "use `holozen tf echo odom`"),
+    ("xacro xacro my_bot.xacro name:=x", "use `holozen xacro my_bot.xacro name:=x`"),
+    ("teleop_twist_keyboard teleop_twist_keyboard", "use `holozen teleop`"),
+    ("rviz2 rviz2 -d a.rviz", "use `holozen view` or `holozen map`"),
+    ("rviz2", "rviz2 is not run here: use `holozen view` or `holozen map`"),
+    ("gazebo_ros spawn_model -urdf -model Fred -file a.urdf", "use `holozen spawn -urdf -model Fred -file a.urdf`"),
+    ("gazebo_ros gzserver", "use `holozen sim --empty`"),
+    ("gazebo_ros gzclient", "use `holozen view` or `holozen map`"),
+    ("tf2_tools view_frames", "tf2_tools view_frames is not run here: use `holozen view` or `holozen tf echo`"),
+    ("demo_nodes_cpp talker", "use `holozen topic pub chatter std_msgs/msg/String '{data: Hello}'`"),
+    ("robot_state_publisher robot_state_publisher", "the sim itself publishes joint_states and tf"),
+]
+
+
+def test_of_what_is_ros_own_it_names_the_verb(refuse: Run) -> None:
+    for words, expected in ROS_OWN:
+        done = refuse(*words.split())
+        assert (done.returncode, done.stdout) == (1, "")
+        assert done.stderr.startswith("holozen run: ") and done.stderr.endswith(f"{expected}\n")
+        assert done.stderr.count("\n") == 1
 
 
 def test_the_static_transform_publisher_is_run_by_its_name(run: Run) -> None:

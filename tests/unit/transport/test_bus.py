@@ -186,11 +186,9 @@ def test_nobody_writes_to_a_wildcard(wire: Wire) -> None:
         assert "write to one key" in refusal(use)
 
 
-@pytest.mark.parametrize(
-    "name", ["", "a;b", "a@b", "x\n", "#?", "*", "a/", "/a", "a  b", "x" * 256], ids=lambda name: repr(name[:9])
-)
-def test_a_name_of_a_node_that_would_be_misread_is_refused_at_once(wire: Wire, name: str) -> None:
-    assert refusal(lambda: wire.bus(name)).startswith(f"name of a node {name[:9]!r}"[:-1])
+def test_a_name_of_a_node_that_would_be_misread_is_refused_at_once(wire: Wire) -> None:
+    for name in ("", "a;b", "a@b", "x\n", "#?", "*", "a/", "/a", "a  b", "x" * 256):
+        assert refusal(partial(wire.bus, name)).startswith(f"name of a node {name[:9]!r}"[:-1])
 
 
 def test_the_names_that_programs_give_are_taken(wire: Wire) -> None:

@@ -247,11 +247,9 @@ NETWORKS: list[tuple[dict[str, Any], set[str]]] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("flags", "networks"), NETWORKS)
-def test_networks_are_known_by_their_endpoints_however_these_are_written(
-    flags: dict[str, Any], networks: set[str]
-) -> None:
-    assert {*Connection(**flags).networks} == networks
+def test_networks_are_known_by_their_endpoints_however_these_are_written() -> None:
+    for flags, networks in NETWORKS:
+        assert {*Connection(**flags).networks} == networks, flags
 
 
 def test_a_domain_is_the_network_of_its_meeting_points_and_no_other() -> None:
