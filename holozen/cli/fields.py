@@ -57,12 +57,12 @@ class Fields(SimpleNamespace):
         return vars(self)[name]
 
 
-def _attributes(value: Any) -> Any:
+def as_object(value: Any) -> Any:
     """A value, with all messages in it as Fields."""
     if isinstance(value, dict):
-        return Fields(**{name: _attributes(inner) for name, inner in value.items()})
+        return Fields(**{name: as_object(inner) for name, inner in value.items()})
     if isinstance(value, list) and value and isinstance(value[0], dict):
-        return [_attributes(inner) for inner in value]
+        return [as_object(inner) for inner in value]
     return value
 
 
@@ -98,6 +98,6 @@ class Filter:
         return ""
 
     def _value(self, message: Any) -> Any:
-        fields = _attributes(message)
+        fields = as_object(message)
         names = vars(fields) if isinstance(fields, Fields) else {}
         return eval(self._code, {**names, "m": fields, "__builtins__": builtins})

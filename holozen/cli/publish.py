@@ -11,12 +11,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from types import SimpleNamespace
 from typing import Any
 
 from holozen import wire
 from holozen.bus import Bus
 from holozen.cli import values
+from holozen.cli.fields import as_object
 from holozen.cli.hints import suggest_key
 from holozen.cli.output import decode
 from holozen.command.feedback import CommandFeedback
@@ -252,9 +252,9 @@ def _status(kind: Interface, sample: Sample) -> Any:
     if sample.encoding.startswith(WIRES["cdr"]):
         from holozen.messages import cdr
 
-        return _object(cdr.read(kind, sample.payload))
+        return as_object(cdr.read(kind, sample.payload))
     try:
-        return _object(completed(kind, decode(sample.payload, sample.encoding), tolerant=True))
+        return as_object(completed(kind, decode(sample.payload, sample.encoding), tolerant=True))
     except InterfaceError as error:
         raise CodecError(str(error)) from None
 
@@ -308,7 +308,7 @@ class Form:
         if bad and not self._force:
             raise ValueError(f"{bad} is not a finite number{FORCE}")
         if self._is_command:
-            command = self.command = _object(value)
+            command = self.command = as_object(value)
             if not self._force and (bad := wire.implausible(command, self.kind.name)):
                 raise ValueError(f"{bad}{FORCE}")
             if (fields := wire.stop(command, self.kind.name)) is not None:
@@ -338,10 +338,3 @@ def written(kind: Interface, value: dict[str, Any], wire: str) -> bytes:
     import msgspec
 
     return msgspec.msgpack.encode(value)
-
-
-def _object(value: Any) -> Any:
-    """Plain values with their fields as attributes."""
-    if isinstance(value, dict):
-        return SimpleNamespace(**{name: _object(inner) for name, inner in value.items()})
-    return [_object(inner) for inner in value] if isinstance(value, list) else value
