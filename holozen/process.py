@@ -58,6 +58,16 @@ def deferred_interrupt() -> Iterator[None]:
         raise KeyboardInterrupt
 
 
+def interrupt_again(unraisable: "sys.UnraisableHookArgs") -> None:
+    """As sys.unraisablehook: a Ctrl-C in a callback of the interpreter, such as each import has, would be lost. It
+    interrupts what runs next.
+    """
+    if unraisable.exc_type is not KeyboardInterrupt:
+        sys.__unraisablehook__(unraisable)
+    else:  # by another thread: from here, it would interrupt this function
+        _thread.start_new_thread(os.kill, (os.getpid(), signal.SIGINT))
+
+
 class Ending:
     """Ends a process that has opened Zenoh sessions: as Python does, but without finalizing the interpreter.
 

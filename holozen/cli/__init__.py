@@ -8,7 +8,7 @@ import sys
 from types import ModuleType
 from typing import Any
 
-from holozen.process import Ending
+from holozen.process import Ending, interrupt_again
 
 VERBS = {
     "up": "start the sim, the controller, the pose service, and the teleop in this terminal",
@@ -98,6 +98,7 @@ def main(argv: list[str] | None = None) -> int:
     if sys.stdout.errors == "strict":  # names may have letters that the terminal's encoding lacks
         sys.stdout.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     ending = Ending()
+    sys.unraisablehook = interrupt_again
     code: int | str | None
     try:
         code = _guarded(sys.argv[1:])

@@ -18,18 +18,19 @@ PATIENCE = 60.0  # s for steps, or for a sim to start
 
 
 class LockStep:
-    """A paused sim on a test's wire, and one of its robots, by name; `flags` are those of `holozen sim`.
+    """A paused sim on a test's wire, and one of its robots, by name. Flags are those of `holozen sim`, options those of
+    Process.
 
     A step is one of the world, 1/240 s by default. The effect of a command over a number of steps is the same, to the
     last bit, on a slow computer and on a fast one. Other processes may take part, and read and command as always.
     `odom` and `status` are the newest messages.
     """
 
-    def __init__(self, wire: Wire, *flags: str, robot: str = "") -> None:
+    def __init__(self, wire: Wire, *flags: str, robot: str = "", **options: Any) -> None:
         from holozen.messages import CommandStatus, Odometry, SimulationStatus, Twist
         from holozen.wire import key_for
 
-        self.process = wire.start("sim", "--paused", *flags)
+        self.process = wire.start("sim", "--paused", *flags, **options)
         # Another sim that is here already would answer in its place, and this one ends.
         self.process.wait_for_line(f"{robot} listens on", PATIENCE)
         self.bus = wire.bus("lock_step")

@@ -3,7 +3,6 @@
 import os
 import pty
 import select
-import sys
 import termios
 import threading
 import time
@@ -14,18 +13,21 @@ from holozen.testing.process import PATIENCE, Process, wait_for
 
 SIZE = 100, 32  # columns and rows
 LAST = 1.0  # s to wait for the last output of a process that has ended, while another one keeps its terminal open
-# Makes the terminal on standard input the controlling one, so that it delivers hang-ups and interrupts.
-_ENTER = "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); os.execvp(sys.argv[1], sys.argv[1:])"
 
 
 class Terminal:
     """A process and the terminal it runs in. Its output is read continuously, as by a real terminal.
 
-    `size` is in columns and rows. Only `screen` needs the package pyte.
+    `size` is in columns and rows; `is_new` is as for Process. Only `screen` needs the package pyte.
     """
 
     def __init__(
-        self, words: Sequence[str], *, env: Mapping[str, str] | None = None, size: tuple[int, int] = SIZE
+        self,
+        words: Sequence[str],
+        *,
+        env: Mapping[str, str] | None = None,
+        size: tuple[int, int] = SIZE,
+        is_new: bool = False,
     ) -> None:
         self._master, slave = pty.openpty()
         self._size = size
@@ -39,12 +41,14 @@ class Terminal:
         self._read_all = threading.Event()  # set once nothing more can come
         try:
             self.process = Process(
-                [sys.executable, "-S", "-c", _ENTER, *words],
+                words,
                 # Not inside the tmux or screen that the tests may run in.
                 env={"TERM": "xterm-256color", "TMUX": "", "STY": "", **(env or {})},
                 stdin=slave,
                 stdout=slave,
                 stderr=slave,
+                terminal=True,
+                is_new=is_new,
             )
         finally:
             os.close(slave)

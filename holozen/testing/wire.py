@@ -4,11 +4,10 @@ import contextlib
 import random
 import socket
 import subprocess
-import sys
 from collections import deque
 from typing import TYPE_CHECKING, Any, Self
 
-from holozen.testing.process import Process
+from holozen.testing.process import START, Process, run
 from holozen.testing.terminal import Terminal
 from holozen.transport.connection import Connection
 
@@ -47,9 +46,10 @@ class Wire:
 
     def run(self, verb: str, *words: str, given: str = "", within: float = 30.0) -> subprocess.CompletedProcess[str]:
         """Run `holozen VERB WORDS...` here to its end, with `given` as its standard input."""
-        return subprocess.run(
-            command(verb, *words, *self.flags), input=given, capture_output=True, text=True, timeout=within
-        )
+        all_words = command(verb, *words, *self.flags)
+        if given:
+            return subprocess.run(all_words, input=given, capture_output=True, text=True, timeout=within)
+        return run(all_words, within)
 
     def bus(self, node: str = "test", **options: Any) -> "Bus":
         """A bus here, closed with the test. Options are those of holozen.bus.Bus."""
@@ -64,7 +64,7 @@ class Wire:
 
 def command(verb: str, *words: str) -> list[str]:
     """The command line that runs `holozen VERB WORDS...` with this Python."""
-    return [sys.executable, "-m", "holozen", verb, *words]
+    return [*START, verb, *words]
 
 
 KEPT = 200  # marks of ports

@@ -97,7 +97,7 @@ def test_the_same_commands_at_the_same_steps_move_all_to_the_same_bits(
     lock_step: Sim, trials: Callable[[int, int], int], engine: str
 ) -> None:
     flags = ("--engine", engine, *WORLD, *ROBOTS)
-    sim = lock_step(*flags, robot="Planar")
+    sim = lock_step(*flags, robot="Planar", is_new=True)
     loaded = Path(f"/proc/{sim.process.pid}/maps").read_text()
     assert [name for name, file in LIBRARIES.items() if file in loaded] == [engine]
     hashes = {drive(sim)}

@@ -25,6 +25,7 @@ from .played import KITTY, REPEAT, Played, event
 FORWARD, BACKWARD = map(ord, "i,")
 SPEED = 0.5  # m/s
 RESTS = 1e-6  # m/s, rad/s
+MOVES = 1e-4  # m/s, rad/s; a body that has come to rest may still settle by less
 RATE = 240  # Hz of sim time; every step publishes how the robot moves
 
 BOX = f"""<robot name="box">
@@ -75,7 +76,7 @@ class Witness:
 
     def moved_after(self, time: float) -> bool:
         """Whether it moved at any time after `time`."""
-        return any(speed > RESTS for _, speed in self.seen[bisect(self.seen, (time, math.inf)) :])
+        return any(speed > MOVES for _, speed in self.seen[bisect(self.seen, (time, math.inf)) :])
 
     def _watch(self) -> None:
         with contextlib.suppress(BusError):

@@ -20,12 +20,12 @@ def handlers() -> Iterator[None]:
         signal.signal(number, handler)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_sets_the_event_and_interrupts_nothing(number: signal.Signals) -> None:
-    stop = stop_event()
-    assert not stop.is_set()
-    signal.raise_signal(number)
-    assert stop.wait(10)
+def test_a_signal_sets_the_event_and_interrupts_nothing() -> None:
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        stop = stop_event()
+        assert not stop.is_set()
+        signal.raise_signal(number)
+        assert stop.wait(10), number
 
 
 def test_a_process_waits_for_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -94,3 +94,18 @@ def test_an_interrupt_is_deferred_to_the_end_of_an_import() -> None:
         "except KeyboardInterrupt:\n    print('interrupted', signal.getsignal(2) is signal.default_int_handler)\n"
     )
     assert ended(code) == (0, "within\ninterrupted True\n", "")
+
+
+def test_an_interrupt_in_a_callback_of_the_interpreter_is_not_lost() -> None:
+    code = (
+        "import signal, sys, time\nfrom holozen.process import interrupt_again\n"
+        "sys.unraisablehook = interrupt_again\n"
+        "class Object:\n    def __del__(self): signal.raise_signal(2)\n"
+        "try:\n    object = Object()\n    del object\n    time.sleep(30)\n"
+        "except KeyboardInterrupt:\n    print('interrupted')\n"
+        "class Object:\n    def __del__(self): 1 / 0\n"
+        "Object()\n"
+    )
+    ending, out, shown = ended(code)
+    assert (ending, out) == (0, "interrupted\n")
+    assert shown.endswith("ZeroDivisionError: division by zero\n")
