@@ -229,13 +229,19 @@ def run(words: Sequence[str], within: float = PATIENCE, **options: Any) -> subpr
 
 def _can_fork(words: Sequence[str], env: Mapping[str, str]) -> bool:
     """Whether a fork would do what these words do in a new Python with these variables."""
-    if not hasattr(os, "pidfd_open") or list(words[: len(START)]) != START or words[len(START)] in PARENTS:
+    start, verb = list(words[: len(START)]), words[len(START) :][:1]
+    if not hasattr(os, "pidfd_open") or start != START or not verb or verb[0] in PARENTS:
         return False
-    return _fixed(env) == _server()[1]
+    with _starting:  # tests start processes in several threads
+        fixed = _server()[1]
+    return _fixed(env) == fixed
 
 
 def _fixed(env: Mapping[str, str]) -> dict[str, str]:
     return {name: value for name, value in env.items() if name.startswith(FIXED)}
+
+
+_starting = threading.Lock()
 
 
 @cache
