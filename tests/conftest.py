@@ -58,12 +58,13 @@ def pytest_sessionfinish(exitstatus: int) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    order = {path: number for number, path in enumerate(dict.fromkeys(item.path for item in items))}
+    paths = dict.fromkeys(item.path for item in items)
+    order = {path: (QUICK in path.parents, number) for number, path in enumerate(paths)}
 
-    def place(item: pytest.Item) -> tuple[bool, int, bool]:
+    def place(item: pytest.Item) -> tuple[tuple[bool, int], bool]:
         """The long files first: none is left over at the end. In a file, the tests that share processes last."""
         shares = item.path.parent in REORDERED and not SHARED.isdisjoint(getattr(item, "fixturenames", ()))
-        return QUICK in item.path.parents, order[item.path], shares
+        return order[item.path], shares
 
     items.sort(key=place)
 
