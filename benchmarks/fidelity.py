@@ -9,8 +9,10 @@ straight line or the arc that wheels without slip would drive.
 import math
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
+
+from msgspec.structs import replace
 
 from benchmarks.report import parser, show, write
 from holozen.flags import ENGINES

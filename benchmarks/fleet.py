@@ -13,10 +13,11 @@ import sys
 import threading
 import time
 from contextlib import ExitStack, closing
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
+
+from msgspec.structs import replace
 
 from benchmarks.company import beside, guest, host, meeting_point, until
 from benchmarks.report import Case, parser, publish

@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from holozen.limits import Planar
 from holozen.rotation import XYZ
 
 
-@dataclass(frozen=True, slots=True)
-class Wheel:
+class Wheel(Struct, frozen=True):
     """A wheel that rolls on the ground: centre (x, y) and axle direction (ax, ay) in the body frame, radius in m.
 
     `skew` is the tangent of the angle from the rolling direction to the axis of the roller on the ground: 0 on an omni

@@ -5,8 +5,9 @@ otherwise. Matrices, and rotations of whole arrays, are in holozen/robot/rotatio
 """
 
 import math
-from dataclasses import dataclass
 from typing import Protocol
+
+from msgspec import Struct
 
 XYZ = tuple[float, float, float]
 XYZW = tuple[float, float, float, float]
@@ -115,8 +116,7 @@ class Quaternion(Vector, Protocol):
     w: float
 
 
-@dataclass(frozen=True, slots=True)
-class Transform:
+class Transform(Struct, frozen=True):
     """A rigid transform, which takes points of a child frame into its parent: rotate, then translate."""
 
     translation: XYZ = (0.0, 0.0, 0.0)

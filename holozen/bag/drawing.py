@@ -1,9 +1,10 @@
 """Draws a bag: the paths of the robots, and their velocities next to those commanded."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+from msgspec import Struct
 
 from holozen import wire
 from holozen.bag import BagError, Message
@@ -18,8 +19,7 @@ MAX_ROWS = 20_000  # rows of a track; when it has more, every other row is dropp
 TWISTS = (Twist, TwistStamped)
 
 
-@dataclass
-class Track:
+class Track(Struct):
     """The messages of one key.
 
     `rows`: time in s since the start of the bag, x and y in m, forward and left in m/s, turn in rad/s. For commands x
@@ -27,7 +27,7 @@ class Track:
     """
 
     key: str
-    rows: list[tuple[float, ...]] = field(default_factory=list)
+    rows: list[tuple[float, ...]] = []
     count: int = 0
     _stride: int = 1
 
@@ -44,12 +44,11 @@ class Track:
         return [row[number] for row in self.rows]
 
 
-@dataclass
-class Tracks:
+class Tracks(Struct):
     """The tracks of a bag, by key."""
 
-    odometry: dict[str, Track] = field(default_factory=dict)
-    commands: dict[str, Track] = field(default_factory=dict)
+    odometry: dict[str, Track] = {}
+    commands: dict[str, Track] = {}
     bad: int = 0  # messages of these types that cannot be read or are out of range
 
     def add(self, rows: dict[str, Track], key: str, row: tuple[float, ...]) -> None:

@@ -3,9 +3,10 @@
 import re
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
+
+from msgspec import Struct
 
 from holozen.bag import BagError, Channel, Message
 
@@ -90,8 +91,7 @@ def _opened(path: Path) -> "McapFile | SqliteFile":
     return McapFile(path)
 
 
-@dataclass
-class Stream:
+class Stream(Struct):
     """The messages of one channel. Times in ns."""
 
     channel: Channel
@@ -133,13 +133,12 @@ class Stream:
         }
 
 
-@dataclass
-class Summary:
+class Summary(Struct):
     """All channels of a bag. Times in ns."""
 
     path: str
     size: int
-    streams: dict[Channel, Stream] = field(default_factory=dict)
+    streams: dict[Channel, Stream] = {}
     cut_off: bool = False
 
     @property

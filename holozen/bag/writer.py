@@ -6,11 +6,11 @@ import json
 import os
 import tempfile
 from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from mcap.writer import CompressionType, Writer
+from msgspec import Struct
 
 from holozen.bag import ENCODING, BagError
 from holozen.bag.formats import Format, offered_qos
@@ -133,8 +133,7 @@ class BagWriter:
         return channel
 
 
-@dataclass
-class Span:
+class Span(Struct):
     """How many messages, and the times of the first and the last, in ns."""
 
     count: int = 0

@@ -3,7 +3,8 @@
 import re
 from bisect import bisect
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+
+from msgspec import Struct
 
 from holozen.check.engine import Edit, Finding
 
@@ -20,8 +21,7 @@ Span = tuple[int, int, str]
 """A part of the text, by its first and its end offset, and its replacement."""
 
 
-@dataclass(eq=False, slots=True)
-class _Element:
+class _Element(Struct, eq=False):
     """An element of the text, by offsets. `names` are the spans of its name in the start tag and the end tag, `inside`
     to `close` is its content.
     """
@@ -35,7 +35,7 @@ class _Element:
     inside: int
     close: int
     end: int
-    children: list["_Element"] = field(default_factory=list)
+    children: list["_Element"] = []
 
 
 def correct(text: str, file: str, findings: Iterable[Finding]) -> tuple[str, list[Finding]]:

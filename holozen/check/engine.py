@@ -2,10 +2,11 @@
 
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Literal
+
+from msgspec import Struct
 
 from holozen.check.geometry import Placed, Wheel, find_wheels, place_shapes
 from holozen.robot import reader
@@ -22,8 +23,7 @@ from holozen.robot.xacro import Outcome, is_xacro, unasked
 Severity = Literal["error", "warning"]
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
+class Place(Struct, frozen=True):
     """A file and line; line 0 means the whole file. `expanded`: it is a line of the output of `holozen xacro`."""
 
     file: str
@@ -36,8 +36,7 @@ class Place:
         return f"{self.file}:{self.line}" + (" (line of `holozen xacro`'s output)" if self.expanded else "")
 
 
-@dataclass(frozen=True, slots=True)
-class Edit:
+class Edit(Struct, frozen=True):
     """A correction that needs no judgement. The kinds "element" and "attribute" change the name `old` to `new`; with
     "inertia", `new` is the <inertia> of a link, which replaces the `old` one or, if `old` is empty, is added. `owner`
     is the name of the element that has the attribute, or that of the link.
@@ -49,8 +48,7 @@ class Edit:
     owner: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Mistake:
+class Mistake(Struct, frozen=True):
     """A mistake that a rule found: at an element, at a place, or (None) in the whole file."""
 
     at: Tag | Place | None
@@ -59,8 +57,7 @@ class Mistake:
     edit: Edit | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Rule:
+class Rule(Struct, frozen=True):
     """A rule: `finds` and `why` describe it, `find` inspects a robot file. With an "error" the robot cannot be used as
     intended; with a "warning" it can.
     """
@@ -80,8 +77,7 @@ def rule(name: str, severity: Severity, finds: str, why: str) -> Callable[[Find]
     return lambda find: Rule(name, severity, finds, why, find)
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
+class Finding(Struct, frozen=True):
     """A mistake with the rule that found it."""
 
     rule: str
@@ -114,8 +110,7 @@ _WHERE = re.compile(r"(?P<file>.*?)(?:, line (?P<line>\d+))?: (?P<text>.*)", re.
 PLUGIN_OWNERS = ("model", "world", "sensor")  # in SDF
 
 
-@dataclass(frozen=True, slots=True)
-class Requirements:
+class Requirements(Struct, frozen=True):
     """Requirements on the robot. `fits`: the largest length, width and optionally height in metres; empty for none.
     `require`: a file with the names of links and joints.
     """
@@ -124,8 +119,7 @@ class Requirements:
     require: Path | None = None
 
 
-@dataclass(eq=False)
-class Subject:
+class Subject(Struct, eq=False, dict=True):
     """The file under check. `root` is its <robot>, with xacro expanded, or its <model> for an SDF file (`sdf`). `model`
     is None if the file cannot be loaded; `messages` are the loader's. `origins` maps elements to their source lines,
     `calls` to the name and the call of the macro that made them.
@@ -135,14 +129,14 @@ class Subject:
     path: Path
     root: Tag
     sources: list[SourceFile]
-    packages: Mapping[str, Path] = field(default_factory=dict)
+    packages: Mapping[str, Path] = {}
     requirements: Requirements = Requirements()
     sdf: bool = False
     model: RobotModel | None = None
-    messages: list[tuple[Severity, Mistake]] = field(default_factory=list)
-    origins: Mapping[Tag, Place] = field(default_factory=dict)
-    calls: Mapping[Tag, tuple[str, Place]] = field(default_factory=dict)
-    forgiven: list[Mistake] = field(default_factory=list)
+    messages: list[tuple[Severity, Mistake]] = []
+    origins: Mapping[Tag, Place] = {}
+    calls: Mapping[Tag, tuple[str, Place]] = {}
+    forgiven: list[Mistake] = []
 
     @cached_property
     def links(self) -> dict[str, Tag]:

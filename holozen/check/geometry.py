@@ -3,10 +3,11 @@
 import math
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
+from msgspec.structs import replace
 
 from holozen.robot.elements import Tag
 from holozen.robot.errors import RobotError
@@ -22,8 +23,7 @@ UP, DOWN = np.array((0.0, 0.0, 1.0)), np.array((0.0, 0.0, -1.0))
 WAYS = np.vstack([np.eye(3), -np.eye(3)])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Placed:
+class Placed(Struct, frozen=True, eq=False):
     """A shape of `link`, a "collision" or "visual" by its `use`, with its `frame` in the root frame; in metres. `solid`
     is the shape, or the hull of a mesh. Its bounding box along its own axes has its centre at `centre`, in the root
     frame, and the half sizes `half`; a cylinder's axis is its z.
@@ -128,8 +128,7 @@ _NOT_ROLLING = re.compile(r"steer|caster|castor|swivel|roller|rotor|prop", re.IG
 _CASTER = re.compile(r"caster|castor|ball|swivel|roller", re.IGNORECASE)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Wheel:
+class Wheel(Struct, frozen=True, eq=False):
     """A link that turns on a continuous joint and rolls, with the `links` fixed to it. `shape` is its collision shape,
     else its visual one.
     """

@@ -1,7 +1,8 @@
 """The requirements of a task: the size of the robot (--fits), and the names of links and joints (--require)."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from holozen.check.engine import Mistake, Place, Subject, rule
 from holozen.check.geometry import box_of, size_of
@@ -14,8 +15,7 @@ from holozen.suggest import listed, suggest
 GRAIN = 1e-6  # m; rounding error of sums of decimals
 
 
-@dataclass(frozen=True, slots=True)
-class Need:
+class Need(Struct, frozen=True):
     """A required link or joint, optionally with a joint type."""
 
     kind: str

@@ -1,7 +1,9 @@
 """Mass and inertia: whether they are physically possible, and whether they suit the shape."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from holozen.check.engine import Edit, Mistake, Subject, rule
 from holozen.check.geometry import box_of, extent, fixed_bodies, size_of
@@ -24,8 +26,7 @@ COMPUTE = "compute it from the shape"
 WORDS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
-@dataclass(frozen=True, slots=True)
-class Given:
+class Given(Struct, frozen=True):
     """The values of an <inertial>: kg and kg m^2, None if not a number."""
 
     tag: Tag

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 from statistics import fmean, median_low
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
 
 from holozen.check.engine import Mistake, Subject, rule
 from holozen.check.geometry import (
@@ -36,8 +36,7 @@ STEEPEST = math.tan(math.radians(20))  # a robot that leans more falls or balanc
 ROUNDS = 40
 
 
-@dataclass(frozen=True, slots=True)
-class Ground:
+class Ground(Struct, frozen=True):
     """The plane z = a x + b y + c of the ground in the root frame, in metres; `tips`: the robot leans by more than 20
     degrees on it.
     """

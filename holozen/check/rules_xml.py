@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from holozen.check.engine import Edit, Mistake, Subject, rule, split
 from holozen.check.spelling import is_clear, nearest
@@ -16,8 +17,7 @@ from holozen.suggest import cut, listed
 # The words of URDF, of its Gazebo elements, and of SDF.
 
 
-@dataclass(frozen=True, slots=True)
-class Words:
+class Words(Struct, frozen=True):
     """The allowed contents of an element."""
 
     attributes: frozenset[str]

@@ -5,7 +5,6 @@ import json
 import math
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -48,8 +47,7 @@ class Place(NamedTuple):
 ANYWHERE = Place()
 
 
-@dataclass(frozen=True, slots=True)
-class Candidate:
+class Candidate(NamedTuple):
     """A valid robot to spawn: its name, the text to send, and its model.
 
     Its keys are below `namespace`: empty for its name, a slash for the root.
@@ -61,8 +59,7 @@ class Candidate:
     namespace: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Spawned:
+class Spawned(NamedTuple):
     """A spawned entity: its name, the key of its commands (empty if it takes none), its pose, and advice."""
 
     name: str
@@ -95,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
         args.error("--count gives names of its own: leave out --replace and --namespace")
     place = Place(args.x, args.y, args.z, args.R, args.P, args.Y)
     candidate = read(file, args.name or "", values, dict(args.package), args.drive or "", args.strict, args.allow_env)
-    candidate = replace(candidate, namespace=args.namespace)
+    candidate = candidate._replace(namespace=args.namespace)
     with Bus("spawn", connection.from_arguments(args), patience=args.timeout or None) as bus:
         if args.count:
             return _put_fleet(bus, candidate, place, args)

@@ -6,8 +6,10 @@ No clock, no socket.
 import math
 from collections.abc import Callable, Iterable
 from copy import deepcopy
-from dataclasses import dataclass, replace
 from typing import NamedTuple
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from holozen.command.motion import AppliedForce, AppliedForces, Motion, is_stop
 from holozen.limits import STOP
@@ -213,8 +215,7 @@ class Parts:
         self._moving = {source: dict.fromkeys(parts, time) for source, parts in other._moving.items()}
 
 
-@dataclass(slots=True)
-class Driver:
+class Driver(Struct):
     """The source that drives, its motion, and the earliest time (s) at which that was sent. Rank 0 is the highest. Of
     one that is `gone`, no command is obeyed.
     """

@@ -1,15 +1,15 @@
 """Commanded motions: a planar velocity, values for joints, or forces."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
+
+from msgspec import Struct
 
 from holozen.limits import STOP, Planar
 from holozen.messages import JointState
 
 
-@dataclass(frozen=True, slots=True)
-class JointMotion:
+class JointMotion(Struct, frozen=True):
     """Values for joints by name: `kind` is "position" (rad, m), "velocity" (rad/s, m/s) or "effort" (N m, N)."""
 
     kind: str
@@ -34,8 +34,7 @@ class AppliedForce(NamedTuple):
     sent: float
 
 
-@dataclass(frozen=True, slots=True)
-class AppliedForces:
+class AppliedForces(Struct, frozen=True):
     """The wrenches of one source, one for each topic."""
 
     pushes: tuple[AppliedForce, ...]

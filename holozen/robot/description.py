@@ -2,10 +2,11 @@
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
+from msgspec.structs import replace
 
 from holozen.robot import reader
 from holozen.robot.elements import Source
@@ -20,8 +21,7 @@ MAX_SHOWN = 3_000_000  # characters of embedded meshes in a text; a reader accep
 THIN = 0.002  # m; the thickness at which a plane is drawn
 
 
-@dataclass(frozen=True, slots=True)
-class Mesh:
+class Mesh(Struct, frozen=True):
     """Triangles as raw bytes from the reader's process, which only `arrays` validates. `color` is the mesh file's, if
     it gives one.
     """
@@ -42,8 +42,7 @@ class Mesh:
         return points, triangles
 
 
-@dataclass(frozen=True, slots=True)
-class Appearance:
+class Appearance(Struct, frozen=True):
     """Links with their visual shapes, and the joints between them. `meshes`, by link and by visual shape, are the
     triangles of a mesh; empty for an unreadable mesh and for any other shape.
     """

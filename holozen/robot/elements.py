@@ -3,9 +3,10 @@
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
+
+from msgspec import Struct
 
 from holozen.robot.errors import RobotError
 from holozen.suggest import cut, suggest, suggest_file
@@ -20,8 +21,7 @@ MAX_ELEMENTS = 50_000
 DEEPEST = 200
 
 
-@dataclass(eq=False, slots=True)
-class Tag:
+class Tag(Struct, eq=False):
     """An XML element. `place` is its file and line, for messages; `at` the offset of its start tag in the UTF-8 bytes
     of the file; `text` its own character data. `sdf` is true inside an `<sdf>`, where a value such as a size is the
     text of a child element; in URDF it is an attribute.
@@ -32,7 +32,7 @@ class Tag:
     place: str
     parent: "Tag | None" = None
     text: str = ""
-    children: "list[Tag]" = field(default_factory=list)
+    children: "list[Tag]" = []
     sdf: bool = False
     at: int = 0
 
@@ -384,8 +384,7 @@ MAX_WARNINGS = 200
 MAX_GUESSES = 20  # each compares every name; a file full of mistakes has to finish soon too
 
 
-@dataclass(slots=True)
-class Source:
+class Source(Struct):
     """The file of a robot, the packages given with it, and the warnings about it.
 
     `strict`: a missing or invalid mesh is an error. `confined`: the text was received over the network, and may only
@@ -394,7 +393,7 @@ class Source:
 
     origin: Path
     packages: Mapping[str, Path]
-    warnings: list[str] = field(default_factory=list)
+    warnings: list[str] = []
     guesses: int = 0
     strict: bool = False
     confined: bool = False

@@ -6,10 +6,9 @@ A plugin is identified by its file name, or for gz-sim by its class.
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 
 import numpy as np
-from msgspec import structs
+from msgspec.structs import replace
 
 from holozen.robot.elements import LARGEST, Source, Tag, Vector, number
 from holozen.robot.errors import RobotError
@@ -266,7 +265,7 @@ def measured(drive: Drive, plugin: Tag, robot: RobotModel) -> Drive:
         front, back = (wheels.front_left, wheels.front_right), (wheels.back_left, wheels.back_right)
         found["wheelbase"] = wheels.wheelbase or _apart(front, back, "wheelbase", plugin, robot)
     found["radius"] = wheels.radius or _radius(left[0], plugin, robot)
-    return replace(drive, mechanism=structs.replace(wheels, **found))
+    return replace(drive, mechanism=replace(wheels, **found))
 
 
 ONE_EACH = "; each wheel needs a joint of its own"
@@ -517,7 +516,7 @@ def with_publisher(drive: Drive, settings: Settings) -> Drive:
     """The drive with the odometry of an OdometryPublisher, which is the true pose."""
     wheels = drive.mechanism
     if isinstance(wheels, Differential | Mecanum | Omni):
-        wheels = structs.replace(wheels, encoder=False)
+        wheels = replace(wheels, encoder=False)
     return replace(
         drive,
         odometry_topic=_gz_topic(settings, "odometry", "odom", "odom_topic"),

@@ -1,10 +1,10 @@
 """Mass and inertia: moments of inertia that a file omits or gets wrong, and links without mass."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from itertools import chain
 
 import numpy as np
+from msgspec.structs import replace
 
 from holozen.robot.elements import Source, Tag
 from holozen.robot.model import Drive, Joint, Link, Moments, Planar, Pose, Shape, descend, sides_of

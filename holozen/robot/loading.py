@@ -2,9 +2,10 @@
 
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
+
+from msgspec.structs import replace
 
 from holozen.robot import reader
 from holozen.robot.elements import Source, Tag, read_text, read_xml, repair_xml

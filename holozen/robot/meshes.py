@@ -11,7 +11,6 @@ import warnings
 import zlib
 from array import array
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
@@ -19,6 +18,7 @@ from typing import BinaryIO
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
 
 from holozen.robot.elements import Tag, Vector, read_xml
 from holozen.robot.errors import RobotError
@@ -113,8 +113,7 @@ def _check(part: Array, place: str) -> None:
         raise RobotError(f"{place}: has a vertex beyond {FARTHEST:g}; export it again, in metres")
 
 
-@dataclass(frozen=True, slots=True)
-class Surface:
+class Surface(Struct, frozen=True):
     """Points (n, 3) in metres, and triangles (m, 3) as indices into them; None: every three points are a triangle.
     `color` is the one that the file gives, if any.
     """
@@ -283,14 +282,13 @@ def _up(root: Tag) -> str:
     return up
 
 
-@dataclass(slots=True)
-class _Scene:
+class _Scene(Struct):
     """The elements of a file by kind and id, and the surfaces of each geometry read so far, with the symbol of their
     material.
     """
 
     elements: dict[tuple[str, str], Tag]
-    read: dict[int, list[tuple[Surface, str]]] = field(default_factory=dict)
+    read: dict[int, list[tuple[Surface, str]]] = {}
 
     @classmethod
     def of(cls, root: Tag) -> "_Scene":

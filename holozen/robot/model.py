@@ -2,17 +2,16 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from holozen.robot.elements import Vector
 from holozen.wire import COMMAND_SILENCE
 
 
-@dataclass(frozen=True, slots=True)
-class Pose:
+class Pose(Struct, frozen=True):
     """A frame in its parent frame: metres, and radians of roll, pitch, yaw about the parent's fixed x, y, z."""
 
     xyz: Vector = (0.0, 0.0, 0.0)
@@ -23,8 +22,7 @@ Moments = tuple[float, float, float, float, float, float]
 """A tensor of inertia: ixx, ixy, ixz, iyy, iyz, izz."""
 
 
-@dataclass(frozen=True, slots=True)
-class Inertial:
+class Inertial(Struct, frozen=True):
     """Mass in kg, and moments of inertia in kg m^2 about the centre of mass, in the axes of `pose`.
 
     `pose` is the inertial frame in the link's. The tensor is positive definite, or all zero for a point mass.
@@ -39,8 +37,7 @@ Color = tuple[float, float, float, float]
 """Red, green, blue, alpha, each from 0 to 1."""
 
 
-@dataclass(frozen=True, slots=True)
-class Shape:
+class Shape(Struct, frozen=True):
     """A visual or collision shape; `pose` is its frame in the link's.
 
     `size` in metres by `kind`: "box" x, y, z; "cylinder" radius, length (along z); "sphere" radius; "plane" x, y (its
@@ -58,8 +55,7 @@ class Shape:
     data: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Surface:
+class Surface(Struct, frozen=True):
     """Contact parameters of a link's collision shapes: friction coefficients (mu2 across mu1), stiffness in N/m and
     damping in N s/m. None: the simulator's default.
     """
@@ -71,8 +67,7 @@ class Surface:
     self_collide: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Link:
+class Link(Struct, frozen=True):
     """A rigid part. Without an `inertial` it has no mass."""
 
     name: str
@@ -83,8 +78,7 @@ class Link:
     gravity: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class Limits:
+class Limits(Struct, frozen=True):
     """Effort in N or N m, velocity in m/s or rad/s, position in m or rad; infinite if the file sets none."""
 
     effort: float = math.inf
@@ -93,8 +87,7 @@ class Limits:
     upper: float = math.inf
 
 
-@dataclass(frozen=True, slots=True)
-class Mimic:
+class Mimic(Struct, frozen=True):
     """A joint that follows another one: multiplier * position + offset."""
 
     joint: str
@@ -102,8 +95,7 @@ class Mimic:
     offset: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Joint:
+class Joint(Struct, frozen=True):
     """`kind` is one of `JOINT_KINDS`. `pose` is the child link's frame in the parent's at joint position
     zero; `axis` is a unit vector in the child's frame, (1, 0, 0) if the kind has none. `friction` is Coulomb friction,
     in N m or N; `damping` in N m s/rad or N s/m.
@@ -125,8 +117,7 @@ MOVING = ("continuous", "revolute", "prismatic")  # the kinds that are simulated
 JOINT_KINDS = (*MOVING, "fixed", "floating", "planar")
 
 
-@dataclass(frozen=True, slots=True)
-class Force:
+class Force(Struct, frozen=True):
     """Messages on `topic` push a link, at its centre of mass; along the link's axes if `in_link`, else the world's.
 
     The topic includes its namespace and has no leading slash.
@@ -217,8 +208,7 @@ def sides_of(mechanism: Mechanism) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return mechanism.left, mechanism.right
 
 
-@dataclass(frozen=True, slots=True)
-class Drive:
+class Drive(Struct, frozen=True):
     """A drive: its topics, rates and limits.
 
     All defaults except the timeout are those of Gazebo's planar_move.
@@ -248,8 +238,7 @@ class Drive:
     max_angular_acceleration: float = math.inf
 
 
-@dataclass(frozen=True, slots=True)
-class Noise:
+class Noise(Struct, frozen=True):
     """Gaussian noise, in the unit of what it is added to."""
 
     mean: float = 0.0
@@ -259,8 +248,7 @@ class Noise:
 NO_NOISE = Noise()
 
 
-@dataclass(frozen=True, slots=True)
-class Fan:
+class Fan(Struct, frozen=True):
     """`count` angles in rad, evenly spaced from `first` to `last`."""
 
     first: float = 0.0
@@ -325,8 +313,7 @@ class Camera(Struct, frozen=True, tag=True):
         return self.image and f"{self.image}/compressed"
 
 
-@dataclass(frozen=True, slots=True)
-class Sensor:
+class Sensor(Struct, frozen=True):
     """A sensor at `pose` on `link`. Its measurements are published on `topic`, which includes its namespace and has no
     leading slash, at `rate` in Hz of sim time, in `frame`: a link, or a frame of its own at `mount` on its link.
     """
@@ -352,8 +339,7 @@ HERE = Pose()
 MAX_PARTS = 1000  # links, and joints; far beyond what an engine simulates in real time
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RobotModel:
+class RobotModel(Struct, frozen=True, eq=False):
     """A tree of links from `root`, in file order. Compared by identity, so that results cached for a model serve all
     its copies in a fleet.
 
@@ -390,8 +376,7 @@ STEP = 1 / 240  # s
 GRAVITY = (0.0, 0.0, -9.8)  # m/s^2; Gazebo's default
 
 
-@dataclass(frozen=True)
-class WorldSpec:
+class WorldSpec(Struct, frozen=True):
     """A world: physics step in s, gravity in m/s^2, real-time factor, and warnings.
 
     `ground`: whether there is a level plane at z = 0. `models` are all others, each with its `pose` in the world; a

@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from msgspec import Struct
 
 from holozen.robot.elements import Vector
 from holozen.robot.errors import RobotError
@@ -36,8 +36,7 @@ FALLS = "has no collision shape and falls through the ground"
 FLEETS = 8  # models whose results are cached, for all their copies
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Frame:
+class Frame(Struct, frozen=True, eq=False):
     """A frame in another one: `position` (3,) in metres, `rotation` (3, 3) whose columns are its axes."""
 
     position: Array
@@ -81,16 +80,14 @@ def compose(outer: Pose, inner: Pose) -> Pose:
     return outer if inner == HERE else (Frame.of(outer) @ Frame.of(inner)).pose
 
 
-@dataclass(frozen=True, slots=True)
-class Axis:
+class Axis(Struct, frozen=True):
     """A joint at zero in the root frame: its origin in metres and the unit vector it turns about or slides along."""
 
     xyz: Vector
     direction: Vector
 
 
-@dataclass(frozen=True, slots=True)
-class PlacedShape:
+class PlacedShape(Struct, frozen=True):
     """A collision shape of `link`; position in metres and quaternion x, y, z, w in the root frame."""
 
     link: str
@@ -99,8 +96,7 @@ class PlacedShape:
     quaternion: XYZW
 
 
-@dataclass(frozen=True, slots=True)
-class Body:
+class Body(Struct, frozen=True):
     """One rigid body in the root frame.
 
     `mass` in kg, `centre` of mass in metres, principal moments `inertia` in kg m^2 about it, and their axes
@@ -194,8 +190,7 @@ def _sum(parts: list[tuple[Frame, Inertial]]) -> tuple[float, Array, Array]:
 # Moving parts: links connected by fixed joints are one part.
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
+class Part(Struct, frozen=True):
     """Links that move together, in the frame of the topmost, `link`.
 
     `joint` moves it, None for the root's part; `parent` is the index of the part that carries it. `xyz` in metres and

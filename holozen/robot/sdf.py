@@ -4,10 +4,12 @@ import math
 import os
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import product
 from pathlib import Path
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from holozen.robot.elements import SHORTEST, Source, Tag, Vector, read_text, read_xml
 from holozen.robot.errors import RobotError
@@ -28,8 +30,7 @@ ENDLESS = 1e16  # SDF's own number for a joint without a limit
 UP = (0.0, 0.0, 1.0)  # SDF's default direction
 
 
-@dataclass(frozen=True, slots=True)
-class Placed:
+class Placed(Struct, frozen=True):
     """A pose, and the name of the frame it is relative to; empty for the default frame of its element."""
 
     pose: Pose
@@ -234,8 +235,7 @@ _HULLS = {"capsule": _capsule, "cone": _cone, "ellipsoid": _ellipsoid}
 GAZEBOS_INERTIAL = Inertial(Pose(), 1.0, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
 
 
-@dataclass(frozen=True, slots=True)
-class ModelFlags:
+class ModelFlags(Struct, frozen=True):
     """A model's settings for all its links."""
 
     static: bool
@@ -414,8 +414,7 @@ BUILT_IN = {"ground_plane": PLANE, "asphalt_plane": PLANE}
 _MODEL_NAME = re.compile(r"[\w .-]+")
 
 
-@dataclass(frozen=True, slots=True)
-class Piece:
+class Piece(Struct, frozen=True):
     """A `<model>` element with its SDF version, and as `source` the file that its URIs are relative to.
 
     `chain` are the files that include it, outermost first.
@@ -427,17 +426,16 @@ class Piece:
     chain: tuple[Path, ...] = ()
 
 
-@dataclass(slots=True)
-class Includes:
+class Includes(Struct):
     """Reads included models, each file once; a text received over the network may use those of known folders only.
 
     `warned` are the unknown elements that have had a warning.
     """
 
     count: int = 0
-    warned: set[str] = field(default_factory=set)
-    _files: dict[Path, Tag] = field(default_factory=dict)
-    _paths: dict[tuple[str, Path], Path] = field(default_factory=dict)
+    warned: set[str] = set()
+    _files: dict[Path, Tag] = {}
+    _paths: dict[tuple[str, Path], Path] = {}
 
     def within(self, outer: Piece) -> Iterator[Piece]:
         """The models directly inside a model or a world, in file order. Raises RobotError.

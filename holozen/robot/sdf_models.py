@@ -1,7 +1,9 @@
 """SDF models -> robots and other bodies: named frames, the joint graph, and one robot per tree of joints."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from holozen.robot.elements import Source, Tag, Vector, read_xml
 from holozen.robot.gazebo_plugins import read_forces, read_plugins
@@ -36,8 +38,7 @@ WORLD = ""
 INSIDE = "::"
 
 
-@dataclass(frozen=True, slots=True)
-class _Node:
+class _Node(Struct, frozen=True):
     """A frame as written: `pose` relative to the frame called `within` in `scope`."""
 
     tag: Tag
@@ -154,8 +155,7 @@ class Frames:
 # A model and the models nested in it.
 
 
-@dataclass(frozen=True, slots=True)
-class Member:
+class Member(Struct, frozen=True):
     """A model, possibly nested in another one, by its full name; `joints` are its joint elements, each with the full
     name of its frame.
     """
@@ -207,8 +207,7 @@ def _name(piece: Piece) -> str:
 OFF_AXIS = 1e-9  # m
 
 
-@dataclass(frozen=True, slots=True)
-class JointEdge:
+class JointEdge(Struct, frozen=True):
     """A joint element between two links, by full names; `name` is its local name in the model.
 
     `frame` is the joint's, and `axis` a unit vector, both in the world.
@@ -234,17 +233,16 @@ class JointEdge:
         return max(map(abs, cross)) > OFF_AXIS
 
 
-@dataclass(slots=True)
-class JointGraph:
+class JointGraph(Struct):
     """The links of a model and its nested models, the parent joint of each, and the links that a joint attaches to the
     world (`grounded`); all by full name. `top` is the model's.
     """
 
     top: str
     frames: Frames
-    links: dict[str, tuple[Member, Tag]] = field(default_factory=dict)
-    parents: dict[str, JointEdge] = field(default_factory=dict)
-    grounded: set[str] = field(default_factory=set)
+    links: dict[str, tuple[Member, Tag]] = {}
+    parents: dict[str, JointEdge] = {}
+    grounded: set[str] = set()
 
     @classmethod
     def of(cls, members: list[Member], frames: Frames) -> "JointGraph":

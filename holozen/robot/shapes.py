@@ -4,7 +4,8 @@ import math
 import os
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from holozen.robot.elements import Source, Tag, Vector, number
 from holozen.robot.errors import RobotError

@@ -5,9 +5,11 @@ import re
 import tempfile
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from holozen.robot import reader
 from holozen.robot.elements import Tag, read_text, read_xml
@@ -22,8 +24,7 @@ _FIND = re.compile(r"\$\(find\s+([^)\s]+)\s*\)")
 _FILENAME = re.compile(rb"""(filename\s*=\s*)("[^"]*"|'[^']*')""")
 
 
-@dataclass(frozen=True, slots=True)
-class SourceFile:
+class SourceFile(Struct, frozen=True):
     """A file as written. `includes`: the filename of each include -> the file, None if it is computed."""
 
     path: Path

@@ -2,8 +2,9 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import TypeVar
+
+from msgspec.structs import replace
 
 from holozen.robot.elements import Source, Tag, Vector
 from holozen.robot.errors import RobotError

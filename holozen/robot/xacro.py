@@ -12,12 +12,13 @@ import stat
 import subprocess
 import sys
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from xml.parsers.expat import ExpatError, ParserCreate
 
 import msgspec
+from msgspec import Struct
+from msgspec.structs import asdict, replace
 
 from holozen.console import report
 from holozen.robot import reader
@@ -29,15 +30,14 @@ from holozen.suggest import cut, listed, suggest
 # What to expand; and the result, with its inputs: files, wildcards, environment variables and packages.
 
 
-@dataclass(frozen=True, slots=True)
-class XacroFile:
+class XacroFile(Struct, frozen=True):
     """A xacro file, the values of its `xacro:arg`, the folders of `--package NAME=DIR`, and the environment variables
     that it may read.
     """
 
     path: Path
-    args: Mapping[str, str] = field(default_factory=dict)
-    packages: Mapping[str, Path] = field(default_factory=dict)
+    args: Mapping[str, str] = {}
+    packages: Mapping[str, Path] = {}
     allow_env: Collection[str] = ()
 
 
@@ -48,8 +48,7 @@ Inputs = dict[str, dict[str, Answer]]
 SAVED = ("file", "glob")  # the kinds that change when a file is saved
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
+class Outcome(Struct, frozen=True):
     """The result of an expansion: a text, or a one-line error.
 
     `inputs` are those that it read. `pure` means that the text depends on nothing else.
@@ -57,7 +56,7 @@ class Outcome:
 
     text: str = ""
     error: str = ""
-    inputs: Inputs = field(default_factory=dict)
+    inputs: Inputs = {}
     warnings: tuple[str, ...] = ()
     pure: bool = False
 

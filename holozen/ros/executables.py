@@ -8,8 +8,9 @@ import configparser
 import contextlib
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
+
+from msgspec import Struct
 
 from holozen.console import Failure
 from holozen.robot.errors import RobotError
@@ -28,8 +29,7 @@ class PackageNotFound(NotFound):
     """There is no such package."""
 
 
-@dataclass(frozen=True, slots=True)
-class Script:
+class Script(Struct, frozen=True):
     """A Python file, run as `__main__`; or `function` of `module`, if that is not empty.
 
     `root` is the first folder in which its imports are looked up.

@@ -8,8 +8,9 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+
+from msgspec import Struct
 
 from holozen.console import report
 from holozen.messages import rcl_interfaces as r
@@ -27,8 +28,7 @@ TWIN_WAIT, TWIN_LOOK = 1.0, 0.05  # s for another node of the same name to be di
 ELSE = "not set, since another parameter of the request was refused"
 
 
-@dataclass(frozen=True, slots=True)
-class Number:
+class Number(Struct, frozen=True):
     """A number from `low` to `high`. `write` gets a value in range; it must not fail."""
 
     name: str
@@ -56,8 +56,7 @@ class Number:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Choice:
+class Choice(Struct, frozen=True):
     """One of several words. Without a `write` it is read-only."""
 
     name: str

@@ -4,9 +4,10 @@ import argparse
 import math
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
+
+from msgspec.structs import replace
 
 from holozen import flags
 from holozen.bus import Bus

@@ -1,7 +1,8 @@
 """Goes to a goal: errors, velocities and legs, as pure functions. Metres, radians, seconds, the frame of odom."""
 
 import math
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from holozen.kinematics import to_body
 from holozen.limits import Planar, clamp_speed, ramp
@@ -12,8 +13,7 @@ Pose = tuple[float, float, float]
 """x, y in metres and theta in radians."""
 
 
-@dataclass(frozen=True)
-class Gains:
+class Gains(Struct, frozen=True):
     """The gains and limits of the controller. `linear` and `angular` in 1/s, speeds in m/s and rad/s, accelerations in
     m/s^2 and rad/s^2.
     """
@@ -53,8 +53,7 @@ def velocity(left: Planar, now: Planar, gains: Gains, dt: float) -> Planar:
     return ramp(now, clamp_speed(wanted, speed, spin), gains.max_acceleration, gains.max_turn_acceleration, dt)
 
 
-@dataclass
-class Leg:
+class Leg(Struct):
     """The way to one goal: its start, its times (s, on odom's clock), and the largest distance (m) from a straight
     line.
     """

@@ -3,9 +3,11 @@
 import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain, count
+
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from holozen.bus import Bus
 from holozen.command.arbiter import CommandTime
@@ -52,8 +54,7 @@ class EntityError(ServiceError):
         self.code = code
 
 
-@dataclass(slots=True, eq=False)
-class Entity:
+class Entity(Struct, eq=False):
     """A robot or object by its name. Without a `robot` it has no keys. A robot's keys begin with `prefix`. `number`
     distinguishes it from all others that have had its name.
     """

@@ -9,7 +9,8 @@ import re
 import time
 import zlib
 from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from holozen.bus import Bus
 from holozen.flags import refused
@@ -25,8 +26,7 @@ SCAN = 1.0  # s between two scans of all tokens for other shards
 _NODE = re.compile(r"sim_(\d{1,2})_of_(\d{1,2})")
 
 
-@dataclass(frozen=True, slots=True)
-class Shard:
+class Shard(Struct, frozen=True):
     """One of `count` sims; `number` is from 1 to `count`."""
 
     number: int

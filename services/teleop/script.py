@@ -6,7 +6,8 @@ import re
 import sys
 import threading
 import time
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from holozen.messages import CommandStatus
 from holozen.suggest import listed, suggest
@@ -26,8 +27,7 @@ UNHEARD = 1.5  # s of commands after which it gives up if the sim has obeyed non
 DURATION = re.compile(r"(\d+(?:\.\d*)?|\.\d+)(ms|s)")
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(Struct, frozen=True):
     """Keys that are held together for some seconds; without keys, none is held."""
 
     seconds: float

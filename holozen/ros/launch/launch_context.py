@@ -4,9 +4,11 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol, Self
+
+from msgspec import Struct, field
+from msgspec.structs import astuple, replace
 
 from holozen.console import Failure
 
@@ -30,14 +32,13 @@ class LaunchError(Failure):
         return ": ".join(filter(None, (self.place, super().__str__())))
 
 
-@dataclass(frozen=True, slots=True)
-class Program:
+class Program(Struct, frozen=True):
     """A process to start. `required`: the launch ends with it. `respawn`: seconds until it is restarted."""
 
     name: str
     words: Sequence[str]
     cwd: str | None = None
-    environment: dict[str, str] = field(default_factory=dict)
+    environment: dict[str, str] = {}
     shell: bool = False
     required: bool = False
     respawn: float | None = None
@@ -56,20 +57,19 @@ class Runner(Protocol):
     def stop(self, reason: str) -> None: ...
 
 
-@dataclass(slots=True)
-class Scope:
+class Scope(Struct):
     """The state that a group of actions has for itself, and the launch files it is in."""
 
-    configurations: dict[str, str] = field(default_factory=dict)
+    configurations: dict[str, str] = {}
     environment: dict[str, str] = field(default_factory=lambda: dict(os.environ))
     namespace: str = ""
-    parameters: list[Any] = field(default_factory=list)
-    remappings: list[tuple[str, str]] = field(default_factory=list)
+    parameters: list[Any] = []
+    remappings: list[tuple[str, str]] = []
     files: tuple[Path, ...] = ()
 
     def copy(self) -> "Scope":
         """A copy, whose changes do not affect this one."""
-        return Scope(*(copy(getattr(self, name)) for name in Scope.__slots__))
+        return Scope(*map(copy, astuple(self)))
 
     def within(self, file: Path) -> "Scope":
         """The same state inside an included file, which may change it."""

@@ -6,10 +6,11 @@ import shlex
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import NamedTuple
+
+from msgspec import Struct
 
 from holozen import data
 from holozen.console import report
@@ -105,15 +106,14 @@ _IGNORED_FLAGS = {
 _MENTIONED_PACKAGE = re.compile(r"package://([\w-]+)")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Executable:
+class Executable(Struct, frozen=True, eq=False):
     """A Node or program in the launch file; `texts` are its parameters that are texts."""
 
     action: Action
     package: str
     name: str
     words: Sequence[str]
-    texts: dict[str, str] = field(default_factory=dict)
+    texts: dict[str, str] = {}
     namespace: str = ""
 
 

@@ -2,7 +2,9 @@
 
 import sys
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from holozen.console import printable
 from holozen.ros import parameter_yaml
@@ -21,17 +23,16 @@ WITHOUT_VALUE = tuple(f"--{verb}-{name}" for verb in ("enable", "disable") for n
 QUIET = "--disable-stdout-logs"
 
 
-@dataclass(slots=True)
-class Arguments:
+class Arguments(Struct):
     """The ROS arguments of a command line, for all nodes of a process, or of `cli_args`, for one node."""
 
-    remaps: list[names.Remap] = field(default_factory=list)
-    sections: list[Section] = field(default_factory=list)
-    levels: list[tuple[str, LoggingSeverity]] = field(default_factory=list)
+    remaps: list[names.Remap] = []
+    sections: list[Section] = []
+    levels: list[tuple[str, LoggingSeverity]] = []
     """Loggers and their levels; "" is the default of all others."""
     quiet: bool = False
     """Whether loggers print nothing."""
-    unparsed: list[str] = field(default_factory=list)
+    unparsed: list[str] = []
     """The words that are not ROS arguments."""
 
     def node_name(self, given: str) -> str:

@@ -4,10 +4,11 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, Self
 from weakref import WeakSet
+
+from msgspec import Struct
 
 from holozen.messages import Clock as ClockMessage
 from holozen.ros import tracebacks
@@ -41,8 +42,7 @@ class ClockChange(IntEnum):
 SOURCE_CHANGES = (ClockChange.ROS_TIME_ACTIVATED, ClockChange.ROS_TIME_DEACTIVATED)
 
 
-@dataclass(frozen=True, slots=True)
-class TimeJump:
+class TimeJump(Struct, frozen=True):
     """How far a clock jumped, and why."""
 
     clock_change: ClockChange
@@ -77,17 +77,15 @@ class JumpThreshold:
         return forward or (self.min_backward is not None and jump.delta <= self.min_backward)
 
 
-@dataclass(eq=False)
 class JumpHandle:
     """The callbacks before and after a jump, until `unregister()`."""
 
-    handles: set["JumpHandle"]
-    threshold: JumpThreshold
-    before: Callable[[], object] | None
-    after: Callable[[TimeJump], object] | None
-
-    def __post_init__(self) -> None:
-        self.handles.add(self)
+    def __init__(
+        self, handles: set["JumpHandle"], threshold: JumpThreshold, before: Callable[[], object] | None,
+        after: Callable[[TimeJump], object] | None,
+    ) -> None:  # fmt: skip
+        self.handles, self.threshold, self.before, self.after = handles, threshold, before, after
+        handles.add(self)
 
     def unregister(self) -> None:
         """Stop calling them. A second time does nothing."""

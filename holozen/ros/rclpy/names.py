@@ -1,8 +1,9 @@
 """Names of nodes, topics and services by ROS's rules: validated, expanded, remapped, and as Zenoh keys."""
 
 import re
-from dataclasses import dataclass
 from typing import NoReturn
+
+from msgspec import Struct
 
 from holozen.ros.rclpy.exceptions import (
     InvalidNamespaceException,
@@ -82,8 +83,7 @@ def expand(name: str, node: str, namespace: str, *, kind: str = "topic") -> str:
     return full
 
 
-@dataclass(frozen=True, slots=True)
-class Remap:
+class Remap(Struct, frozen=True):
     """One remap rule: a name, `__node` or `__ns`, and its replacement. `only` is the node it is for (empty: all)."""
 
     match: str

@@ -5,7 +5,8 @@ Pure: times are arguments, in nanoseconds. Time 0 asks for the newest that all f
 
 import math
 from bisect import bisect_left, bisect_right
-from dataclasses import dataclass, field
+
+from msgspec import Struct
 
 from holozen.rotation import Transform, normalize
 from holozen.suggest import suggest
@@ -40,13 +41,12 @@ class TimeoutException(TransformException):
     """It did not arrive in time."""
 
 
-@dataclass(slots=True)
-class History:
+class History(Struct):
     """The transforms of one child frame: stamps in order, each with parent and transform. A static frame has one."""
 
     static: bool = False
-    stamps: list[int] = field(default_factory=list)
-    values: list[tuple[str, Transform]] = field(default_factory=list)
+    stamps: list[int] = []
+    values: list[tuple[str, Transform]] = []
     stragglers: int = 0  # how many in a row arrived long after newer ones
 
     def put(self, stamp: int, parent: str, transform: Transform, cache_time: int) -> None:

@@ -1,9 +1,9 @@
 """Two wheels that hold a body upright while they drive it, as wheely_boi's plugin does."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from holozen.limits import Planar, clamp
 from holozen.robot.errors import RobotError
@@ -24,8 +24,7 @@ LEAN, LEAN_RATE, SPEED, DISTANCE, EFFORT = 0.2, 1.0, 0.1, 0.1, 0.1
 Gains = tuple[float, float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class Pendulum:
+class Pendulum(Struct, frozen=True):
     """A body on wheels, in SI units: the masses of the body and of all wheels, the wheels' radius, the height of the
     body's centre of mass above the axle, the height of the axle in the root frame, and the inertias of the body and of
     all wheels about the direction of the axle.

@@ -6,11 +6,11 @@ returns, its parts by their indices, the root's first.
 """
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
 
 from holozen.robot.rigid import Part, PlacedShape
 from holozen.rotation import XYZ, XYZW
@@ -24,8 +24,7 @@ Array = npt.NDArray[np.float64]
 UPRIGHT: XYZW = (0.0, 0.0, 0.0, 1.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Contact:
+class Contact(Struct, frozen=True):
     """The contact parameters of a part's shapes: the coefficient of friction, which is multiplied by that of the other
     surface, and the share of it along the part's axle. `stiffness` in N/m and `damping` in N s/m; 0: the engine's own.
     """

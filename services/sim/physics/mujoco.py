@@ -5,12 +5,12 @@ The model is recompiled when a body is added or removed, which takes 7 ms, and 2
 
 import math
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field
 from itertools import count
 
 import mujoco as mj
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct, field
 
 from holozen.console import report
 from holozen.kinematics import velocity_at
@@ -43,8 +43,7 @@ Indices = npt.NDArray[np.intp]
 mj.set_mju_user_warning(lambda text: report(f"sim: warning: mujoco: {text}"))  # else it writes a log file
 
 
-@dataclass(eq=False)
-class _Kept:
+class _Kept(Struct, eq=False):
     """A body, and its indices in the compiled model."""
 
     parts: tuple[Part, ...]
@@ -52,14 +51,14 @@ class _Kept:
     static: bool
     bodies: list[mj.MjsBody]  # of its parts
     motors: list[tuple[float, float]]  # rate and effort of the parts' motors
-    goals: dict[int, tuple[float, float, float]] = field(default_factory=dict)  # by part: position, closing, rate
+    goals: dict[int, tuple[float, float, float]] = {}  # by part: position, closing, rate
     frozen: bool = False
-    ids: list[int] = field(default_factory=list)  # of the parts' bodies
+    ids: list[int] = []  # of the parts' bodies
     geoms: Indices = field(default_factory=lambda: np.zeros(0, np.intp))
     at: int = 0  # the root's index in qpos
     speed: int = 0  # the root's index in qvel
-    joints_at: list[int] = field(default_factory=list)
-    joints_speed: list[int] = field(default_factory=list)
+    joints_at: list[int] = []
+    joints_speed: list[int] = []
 
 
 class MuJoCo(Engine):

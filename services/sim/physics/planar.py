@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from holozen.kinematics import to_body, to_world, travelled
 from holozen.limits import STOP, Planar
@@ -133,8 +134,7 @@ def _graded(speed: float) -> float:
     return GRADE * math.ceil(speed / GRADE)
 
 
-@dataclass(frozen=True, slots=True)
-class Glide:
+class Glide(Struct, frozen=True):
     """A motion over level ground at a constant body-frame velocity. The root frame is at a pose at time `start` (s)."""
 
     start: float

@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
+from msgspec.structs import replace
 
 from holozen.kinematics import Wheel, mecanum_rates, wheel_rate
 from holozen.limits import Planar

@@ -4,8 +4,9 @@ import re
 import textwrap
 import unicodedata
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
+
+from msgspec import Struct
 
 from ..toml_file import one_of
 
@@ -134,8 +135,7 @@ Direction = tuple[int, int, int, int]
 ACTIONS = ("stop", "resume", "next_robot", "help", "quit", "suspend")
 
 
-@dataclass(frozen=True)
-class Layout:
+class Layout(Struct, frozen=True, dict=True):
     """The meaning of keys, by the names of `key_name`; a key that is in no table stops the robot.
 
     `speeds` holds the factors of speed and turn. `positional`: keys are places on the keyboard rather than

@@ -2,7 +2,9 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from holozen.messages import Twist, Vector3
 
@@ -19,8 +21,7 @@ DEAD_MAN = "space"
 PIECES = ("unknown", "escape")  # may be parts of a repeating key on a slow line
 
 
-@dataclass(frozen=True)
-class Settings:
+class Settings(Struct, frozen=True):
     """The parameters of teleop_twist_keyboard, in m/s, rad/s, Hz and s. With a `key_timeout` of None a key counts while
     the terminal repeats it.
     """

@@ -2,11 +2,11 @@
 
 import base64
 import os
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import trimesh
+from msgspec.structs import replace
 
 from holozen.robot import shapes
 from holozen.robot.elements import Source, read_xml

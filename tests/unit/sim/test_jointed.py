@@ -2,10 +2,10 @@
 
 import itertools
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from holozen.robot.errors import RobotError
 from holozen.robot.loading import parse

@@ -1,10 +1,10 @@
 """The motors of joints: each kind of command moves its joint, and silence holds it."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from holozen.command.motion import JointMotion, motion_of
 from holozen.messages import JointState

@@ -1,10 +1,10 @@
 """The wheels of a mecanum base are only drawn turning: forward when it drives forward."""
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from holozen.robot.loading import load, parse
 from holozen.robot.model import Mecanum, RobotModel

@@ -2,10 +2,10 @@
 
 import math
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from holozen.kinematics import travelled
 from holozen.limits import STOP, Planar

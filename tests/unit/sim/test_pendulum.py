@@ -1,9 +1,9 @@
 """The gains hold the pendulum that they were made for, and one that is somewhat different."""
 
 import math
-from dataclasses import replace
 
 import pytest
+from msgspec.structs import replace
 
 from services.sim.physics.balance import Pendulum, gains
 from services.sim.physics.dynamics import GRAVITY

@@ -1,10 +1,10 @@
 """Wheels are only drawn turning, as if they rolled without slipping."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from holozen.robot.loading import load
 from holozen.robot.model import Joint, Pose, RobotModel, Shape
@@ -71,7 +71,7 @@ def test_angles_add_up_what_was_rolled() -> None:
     ids=str,
 )
 def test_what_is_no_wheel_stays_where_it_is(change: dict[str, object]) -> None:
-    odd = replace(HB_BOT.joints["front_wheel_joint"], **change)  # type: ignore[arg-type]
+    odd = replace(HB_BOT.joints["front_wheel_joint"], **change)
     front, left, _ = rates(with_joint(odd), (1, 1, 1))
     assert front == 0
     assert left != 0

@@ -3,11 +3,11 @@ sent.
 """
 
 import math
-from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from holozen.messages import Twist, Vector3
 from services.teleop.control.key_state import LATCH
