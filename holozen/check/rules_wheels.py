@@ -10,17 +10,7 @@ import numpy.typing as npt
 from msgspec import Struct
 
 from holozen.check.engine import Mistake, Subject, rule
-from holozen.check.geometry import (
-    ALIGNED,
-    DOWN,
-    LEAST,
-    UP,
-    Placed,
-    Wheel,
-    body_of,
-    is_called_caster,
-    is_called_wheel,
-)
+from holozen.check.geometry import ALIGNED, DOWN, LEAST, UP, Placed, Wheel, body_of, is_called_caster, is_called_wheel
 from holozen.check.rules_meshes import too_large
 from holozen.robot.elements import Tag, Vector
 from holozen.robot.errors import RobotError

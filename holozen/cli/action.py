@@ -19,17 +19,7 @@ from holozen.console import Failure, report
 from holozen.flags import add_packages, key, number
 from holozen.process import deferred_interrupt, stop_event
 from holozen.suggest import suggest
-from holozen.transport.actions import (
-    CANCEL,
-    FEEDBACK,
-    SEND,
-    Found,
-    State,
-    found_in,
-    key_of,
-    new_id,
-    wait_for_result,
-)
+from holozen.transport.actions import CANCEL, FEEDBACK, SEND, Found, State, found_in, key_of, new_id, wait_for_result
 from holozen.transport.errors import BusError, NoReply
 from holozen.transport.services import call_bytes
 

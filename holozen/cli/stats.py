@@ -150,10 +150,7 @@ class Watch:
 
 
 def watch(
-    args: argparse.Namespace,
-    measure: Measure,
-    report: Callable[[Window], Report],
-    text: Callable[[Report], str],
+    args: argparse.Namespace, measure: Measure, report: Callable[[Window], Report], text: Callable[[Report], str]
 ) -> int:
     """Run a verb that measures each sample by itself."""
     with open_bus(args) as bus:

@@ -95,11 +95,7 @@ class Freshness(Generic[M]):
     """
 
     def __init__(
-        self,
-        keys: tuple[str, ...],
-        senders: Senders,
-        stops: Callable[[M], bool],
-        drives: Callable[[str, float], bool],
+        self, keys: tuple[str, ...], senders: Senders, stops: Callable[[M], bool], drives: Callable[[str, float], bool]
     ) -> None:
         self._keys, self._senders, self._drives = keys, senders, drives
         self.stops = stops  # whether a message is a stop

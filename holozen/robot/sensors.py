@@ -13,19 +13,7 @@ from msgspec import structs
 from holozen.robot.elements import Source, Tag, number
 from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import SENSING, Settings, kind_of, plugins_outside_sensors
-from holozen.robot.model import (
-    HERE,
-    NO_NOISE,
-    Bumper,
-    Camera,
-    Fan,
-    Imu,
-    Lidar,
-    Link,
-    Noise,
-    Pose,
-    Sensor,
-)
+from holozen.robot.model import HERE, NO_NOISE, Bumper, Camera, Fan, Imu, Lidar, Link, Noise, Pose, Sensor
 from holozen.robot.rigid import compose
 from holozen.suggest import cut
 

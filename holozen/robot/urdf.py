@@ -9,15 +9,7 @@ from msgspec.structs import replace
 from holozen.robot.elements import Source, Tag, Vector
 from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import Settings, read_forces, read_plugins
-from holozen.robot.inertia import (
-    NO_INERTIA,
-    check_drive,
-    massless,
-    read_inertia,
-    warn_massless,
-    with_moments,
-    without,
-)
+from holozen.robot.inertia import NO_INERTIA, check_drive, massless, read_inertia, warn_massless, with_moments, without
 from holozen.robot.model import (
     JOINT_KINDS,
     MAX_PARTS,

@@ -199,10 +199,7 @@ class Subscription(Generic[M]):
     """
 
     def __init__(
-        self,
-        samples: RawSubscriber,
-        decode: Callable[[Sample], M],
-        refusal: Callable[[Sample], str] | None = None,
+        self, samples: RawSubscriber, decode: Callable[[Sample], M], refusal: Callable[[Sample], str] | None = None
     ) -> None:
         self.raw, self._decode, self._refusal = samples, decode, refusal
 

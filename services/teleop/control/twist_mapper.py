@@ -41,9 +41,7 @@ class TwistMapper:
 
     def __init__(self, settings: Settings, layout: Layout) -> None:
         self.settings = replace(
-            settings,
-            speed=min(settings.speed, settings.speed_limit),
-            turn=min(settings.turn, settings.turn_limit),
+            settings, speed=min(settings.speed, settings.speed_limit), turn=min(settings.turn, settings.turn_limit)
         )
         self.layout = layout
         self.key_state = KeyState(settings.mode, settings.key_timeout)
