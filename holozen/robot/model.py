@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -392,8 +393,8 @@ class WorldSpec(Struct, frozen=True):
     models: tuple[RobotModel, ...] = ()
 
 
-def descend(root: str, joints: Mapping[str, Joint]) -> Iterator[str]:
-    """`root` and the links below it, every parent before its children."""
+def descend(root: str, joints: Mapping[str, Any]) -> Iterator[str]:
+    """`root` and the links below it, every parent before its children. `joints` have a `parent` and a `child`."""
     children: dict[str, list[str]] = {}
     for joint in joints.values():
         children.setdefault(joint.parent, []).append(joint.child)

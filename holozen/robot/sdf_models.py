@@ -333,11 +333,7 @@ class JointGraph(Struct):
             raise tag.wrong(f"{problem}; remove one, or swap the parent and the child of one")
 
     def _check_circles(self, tag: Tag) -> None:
-        joints = {
-            name: Joint(name, "fixed", edge.parent, edge.child, Pose(), edge.axis, Limits())
-            for name, edge in self.parents.items()
-        }
-        reached = {name for root in self.roots() for name in descend(root, joints)}
+        reached = {name for root in self.roots() for name in descend(root, self.parents)}
         lost = [self.local(name) for name in self.links if name not in reached]
         if lost:
             raise tag.wrong(f"has joints that form a loop through the links {listed(lost)}; remove one joint")
