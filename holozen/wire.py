@@ -123,32 +123,18 @@ SERVICES = (
     Service("get_entities", "simulation_interfaces/srv/GetEntities", "sim", "the names of all entities"),
     Service("get_entity_state", "simulation_interfaces/srv/GetEntityState", "sim", "an entity's pose and velocity"),
     Service("set_entity_state", "simulation_interfaces/srv/SetEntityState", "sim", "moves an entity"),
-    Service(
-        "get_simulation_state",
-        "simulation_interfaces/srv/GetSimulationState",
-        "sim",
-        "whether it plays, is paused or stopped",
-    ),
-    Service(
-        "set_simulation_state", "simulation_interfaces/srv/SetSimulationState", "sim", "plays, pauses, stops or ends it"
-    ),
-    Service(
-        "step_simulation",
-        "simulation_interfaces/srv/StepSimulation",
-        "sim",
-        "makes steps while it is paused; the reply follows all their messages",
-    ),
-    Service(
-        "reset_simulation",
-        "simulation_interfaces/srv/ResetSimulation",
-        "sim",
-        "sets time, poses or entities back to the start",
-    ),
+    Service("get_simulation_state", "simulation_interfaces/srv/GetSimulationState", "sim",
+            "whether it plays, is paused or stopped"),
+    Service("set_simulation_state", "simulation_interfaces/srv/SetSimulationState", "sim",
+            "plays, pauses, stops or ends it"),
+    Service("step_simulation", "simulation_interfaces/srv/StepSimulation", "sim",
+            "makes steps while it is paused; the reply follows all their messages"),
+    Service("reset_simulation", "simulation_interfaces/srv/ResetSimulation", "sim",
+            "sets time, poses or entities back to the start"),
     Service("get_scene", "holozen/srv/GetScene", "sim", "all entities, their keys and poses"),
-    Service(
-        "robot_description", "holozen/srv/RobotDescription", "sim", "an entity's URDF, with its visual meshes in it"
-    ),
-)
+    Service("robot_description", "holozen/srv/RobotDescription", "sim",
+            "an entity's URDF, with its visual meshes in it"),
+)  # fmt: skip
 
 ACTIONS = (
     Action("navigate_to_pose", "nav2_msgs/action/NavigateToPose", "controller", "drives to a pose in odom"),

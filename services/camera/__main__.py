@@ -22,9 +22,8 @@ def parser() -> argparse.ArgumentParser:
         description="render what the cameras of robots see; the sim starts it with the first robot that has a camera",
         epilog="example: holozen camera --exposures exposures",
     )
-    parser.add_argument(
-        "--exposures", default="exposures", metavar="KEY", help="the exposures of one sim (default: %(default)s)"
-    )
+    add = parser.add_argument
+    add("--exposures", default="exposures", metavar="KEY", help="the exposures of one sim (default: %(default)s)")
     connection.add_arguments(parser)
     return parser
 

@@ -57,18 +57,13 @@ def parser() -> argparse.ArgumentParser:
         description="drive a robot to the goals of next_goal",
         epilog="example: holozen controller --laps 0",
     )
-    parser.add_argument(
-        "robot", nargs="?", default="", type=flags.robot, help="the robot's name; default: the robot without a name"
-    )
-    parser.add_argument("--resume", action="store_true", help="let the controller drive again, and exit")
-    parser.add_argument(
-        "--held", action="store_true", help="drive only after `holozen controller --resume` or the teleop's r"
-    )
-    parser.add_argument(
-        "--laps", type=flags.count(), default=1, help="number of laps around the goals; 0: for ever (default: 1)"
-    )
+    add = parser.add_argument
+    add("robot", nargs="?", default="", type=flags.robot, help="the robot's name; default: the robot without a name")
+    add("--resume", action="store_true", help="let the controller drive again, and exit")
+    add("--held", action="store_true", help="drive only after `holozen controller --resume` or the teleop's r")
+    add("--laps", type=flags.count(), default=1, help="number of laps around the goals; 0: for ever (default: 1)")
     for param in PARAMS:
-        parser.add_argument(
+        add(
             param.flag,
             type=flags.number(param.low, param.high, param.unit),
             default=getattr(default, param.field),

@@ -111,16 +111,11 @@ def parser() -> argparse.ArgumentParser:
         description="answer next_goal and get_pose",
         epilog="example: holozen pose-service --shape hexagon --size 2",
     )
-    parser.add_argument("--shape", choices=SHAPES, default="square", help="the goals' shape (default: square)")
-    parser.add_argument(
-        "--size",
-        type=number(*SIZES, "m"),
-        default=1.0,
-        help="side length of the shape in metres (for infinity: half its length; default: 1)",
-    )
-    parser.add_argument(
-        "--goals", type=Path, metavar="FILE", help="read goals from a file instead, one x y theta per line"
-    )
+    add = parser.add_argument
+    add("--shape", choices=SHAPES, default="square", help="the goals' shape (default: square)")
+    add("--size", type=number(*SIZES, "m"), default=1.0,
+        help="side length of the shape in metres (for infinity: half its length; default: 1)")  # fmt: skip
+    add("--goals", type=Path, metavar="FILE", help="read goals from a file instead, one x y theta per line")
     connection.add_arguments(parser)
     return parser
 
