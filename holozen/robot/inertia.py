@@ -174,27 +174,25 @@ def massless(links: Mapping[str, Link], joints: Mapping[str, Joint], root: str) 
 
     A robot without any mass keeps all its links: it can be displayed but not driven.
     """
-    above = {joint.child: joint for joint in joints.values()}
-    order = list(descend(root, joints))
-    masses = _lumped(links, above, order)
+    order = [*descend(root, joints)]
+    masses = _lumped(links, order)
     if all(mass <= LIGHTEST for mass in masses.values()):
         return {}
     lost: dict[str, str] = {}
-    for name in order[1:]:
-        joint = above[name]
+    for joint in order:
         if joint.parent in lost:
-            lost[name] = lost[joint.parent]
-        elif joint.kind != "fixed" and masses[name] <= LIGHTEST:
-            lost[name] = name
+            lost[joint.child] = lost[joint.parent]
+        elif joint.kind != "fixed" and masses[joint.child] <= LIGHTEST:
+            lost[joint.child] = joint.child
     return lost
 
 
-def _lumped(links: Mapping[str, Link], above: Mapping[str, Joint], order: list[str]) -> dict[str, float]:
-    """Link -> its mass plus that of everything fixed to it."""
-    masses = {name: inertial.mass if (inertial := links[name].inertial) else 0.0 for name in order}
-    for name in reversed(order[1:]):
-        if above[name].kind == "fixed":
-            masses[above[name].parent] += masses[name]
+def _lumped(links: Mapping[str, Link], order: list[Joint]) -> dict[str, float]:
+    """Link -> its mass plus that of everything fixed to it. `order` is that of `descend`."""
+    masses = {name: link.inertial.mass if link.inertial else 0.0 for name, link in links.items()}
+    for joint in reversed(order):
+        if joint.kind == "fixed":
+            masses[joint.parent] += masses[joint.child]
     return masses
 
 
@@ -237,7 +235,7 @@ def check_drive(
         if child in lost:
             problem = f"has no mass, so the joint {cut(name)} is left out, as in Gazebo, but the drive needs it"
             raise tags[lost[child]].wrong(f"{problem}; give it an <inertial>")
-    masses = _lumped(links, {joint.child: joint for joint in joints.values()}, list(descend(root, joints)))
+    masses = _lumped(links, [*descend(root, joints)])
     if masses[root] <= LIGHTEST and any(mass > LIGHTEST for mass in masses.values()):
         problem = "is the root and has no mass, nor have the links fixed to it; Gazebo drops such a robot"
         if drive is not None and not isinstance(drive.mechanism, Planar):

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -393,13 +393,16 @@ class WorldSpec(Struct, frozen=True):
     models: tuple[RobotModel, ...] = ()
 
 
-def descend(root: str, joints: Mapping[str, Any]) -> Iterator[str]:
-    """`root` and the links below it, every parent before its children. `joints` have a `parent` and a `child`."""
-    children: dict[str, list[str]] = {}
+J = TypeVar("J", bound=Any)  # has a `parent` and a `child`
+
+
+def descend(root: str, joints: Mapping[str, J]) -> Iterator[J]:
+    """The joints below the link `root`, in which those to a link come before those below it."""
+    below: dict[str, list[J]] = {}
     for joint in joints.values():
-        children.setdefault(joint.parent, []).append(joint.child)
-    waiting = [root]
+        below.setdefault(joint.parent, []).append(joint)
+    waiting = [*below.get(root, ())]
     while waiting:
-        name = waiting.pop()
-        yield name
-        waiting += children.get(name, [])
+        joint = waiting.pop()
+        yield joint
+        waiting += below.get(joint.child, ())

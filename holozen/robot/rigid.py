@@ -120,10 +120,9 @@ class Body(Struct, frozen=True):
 
 def link_frames(model: RobotModel) -> dict[str, Frame]:
     """Link name -> its frame in the root frame, parents first."""
-    above = {joint.child: joint for joint in model.joints.values()}
-    frames = {model.root: Frame.of(Pose())}
-    for name in list(descend(model.root, model.joints))[1:]:
-        frames[name] = frames[above[name].parent] @ Frame.of(above[name].pose)
+    frames = {model.root: Frame.of(HERE)}
+    for joint in descend(model.root, model.joints):
+        frames[joint.child] = frames[joint.parent] @ Frame.of(joint.pose)
     return frames
 
 
@@ -209,7 +208,7 @@ class Part(Struct, frozen=True):
 def assemble(model: RobotModel) -> list[Part]:
     """The parts, every parent before its children, the root's first. A joint that moves no mass is treated as fixed."""
     above = {joint.child: joint for joint in model.joints.values()}
-    tops, within = _grouped(model, above)
+    tops, within = _grouped(model)
     order, parts = list(within), list[Part]()
     for top, links in within.items():
         body, surface = lump_links(model, links), _surface(model, links)
@@ -225,21 +224,20 @@ def assemble(model: RobotModel) -> list[Part]:
 
 def in_parts(model: RobotModel) -> dict[str, tuple[int, Frame]]:
     """Link name -> the index of its part among those of `assemble`, and its frame in that part's."""
-    _, within = _grouped(model, {joint.child: joint for joint in model.joints.values()})
+    _, within = _grouped(model)
     return {link: (index, frame) for index, links in enumerate(within.values()) for link, frame in links.items()}
 
 
-def _grouped(model: RobotModel, above: dict[str, Joint]) -> tuple[dict[str, str], dict[str, dict[str, Frame]]]:
+def _grouped(model: RobotModel) -> tuple[dict[str, str], dict[str, dict[str, Frame]]]:
     """The topmost link of each link's part, and for each of those the frames of its part's links."""
-    moving = _moving(model, above)
-    tops: dict[str, str] = {}
-    within: dict[str, dict[str, Frame]] = {}
-    for name in descend(model.root, model.joints):
-        if name == model.root or name in moving:
+    moving = _moving(model)
+    tops, within = {model.root: model.root}, {model.root: {model.root: Frame.of(HERE)}}
+    for joint in descend(model.root, model.joints):
+        if (name := joint.child) in moving:
             tops[name], within[name] = name, {name: Frame.of(HERE)}
         else:
-            top = tops[name] = tops[above[name].parent]
-            within[top][name] = within[top][above[name].parent] @ Frame.of(above[name].pose)
+            top = tops[name] = tops[joint.parent]
+            within[top][name] = within[top][joint.parent] @ Frame.of(joint.pose)
     return tops, within
 
 
@@ -287,17 +285,15 @@ def falls_through(model: RobotModel) -> bool:
     return not model.static and not any(link.collisions for link in links) and any(link.gravity for link in links)
 
 
-def _moving(model: RobotModel, above: dict[str, Joint]) -> set[str]:
+def _moving(model: RobotModel) -> set[str]:
     """The links that a joint moves. A massless link may still carry others with mass."""
     masses = {name: link.inertial.mass if link.inertial else 0.0 for name, link in model.links.items()}
     found = set()
-    for name in reversed(list(descend(model.root, model.joints))):
-        if name == model.root:
-            continue
-        if above[name].kind in MOVING and masses[name] >= SMALLEST_MASS:
-            found.add(name)
+    for joint in reversed([*descend(model.root, model.joints)]):
+        if joint.kind in MOVING and masses[joint.child] >= SMALLEST_MASS:
+            found.add(joint.child)
         else:
-            masses[above[name].parent] += masses[name]
+            masses[joint.parent] += masses[joint.child]
     return found
 
 

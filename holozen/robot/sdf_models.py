@@ -333,7 +333,8 @@ class JointGraph(Struct):
             raise tag.wrong(f"{problem}; remove one, or swap the parent and the child of one")
 
     def _check_circles(self, tag: Tag) -> None:
-        reached = {name for root in self.roots() for name in descend(root, self.parents)}
+        roots = self.roots()
+        reached = {*roots, *(edge.child for root in roots for edge in descend(root, self.parents))}
         lost = [self.local(name) for name in self.links if name not in reached]
         if lost:
             raise tag.wrong(f"has joints that form a loop through the links {listed(lost)}; remove one joint")
@@ -427,7 +428,7 @@ def _robot(
     root: str, graph: JointGraph, links: Mapping[str, Link], joints: list[Joint], at: Frame, static: bool
 ) -> RobotModel:
     own = graph.local(root)
-    names = set(descend(own, {joint.name: joint for joint in joints}))
+    names = {own, *(joint.child for joint in descend(own, {joint.name: joint for joint in joints}))}
     return RobotModel(
         name=f"{graph.top}_{own.replace(INSIDE, '_')}",
         root=own,

@@ -40,7 +40,7 @@ def root_of(robot: Tag, links: Mapping[str, object], joints: Mapping[str, Joint]
         raise robot.wrong(
             f"has {len(roots)} root links: {listed(roots)}; attach all but one to another link with a joint"
         )
-    reached = set(descend(roots[0], joints)) if roots else set()
+    reached = {*roots, *(joint.child for root in roots for joint in descend(root, joints))}
     lost = [name for name in links if name not in reached]
     if lost:
         raise robot.wrong(f"has joints that form a loop through the links {listed(lost)}; remove one joint")

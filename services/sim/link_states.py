@@ -31,9 +31,8 @@ class LinkTree:
     """
 
     def __init__(self, model: RobotModel) -> None:
-        above = {joint.child: joint for joint in model.joints.values()}
         self._root = model.root
-        self.joints = [(above[name], *placed(above[name].pose)) for name in list(descend(model.root, model.joints))[1:]]
+        self.joints = [(joint, *placed(joint.pose)) for joint in descend(model.root, model.joints)]
 
     def states(
         self, root: LinkState, positions: Mapping[str, float] = {}, rates: Mapping[str, float] = {}
