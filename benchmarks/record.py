@@ -51,7 +51,7 @@ def record(seconds: float, folder: Path) -> tuple[int, dict[str, Any], Path, flo
     words = [HOLOZEN, "record", "-a", "--json", "-o", str(folder / "bag"), *flags]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with (
-        Bus("robots", host(endpoint).replace(cfg=(WAIT,))) as bus,
+        Bus("robots", host(endpoint)._replace(cfg=(WAIT,))) as bus,
         subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process,
     ):
         try:

@@ -147,7 +147,7 @@ def nodes(connection: Connection) -> Iterator[Finding]:
     from holozen.bus import Bus
 
     if connection.mode == "peer" and not connection.config:
-        connection = connection.replace(listen=(connection.own_endpoint,))  # leave the meeting points to others
+        connection = connection._replace(listen=(connection.own_endpoint,))  # leave the meeting points to others
     with Bus("doctor", connection, patience=OPEN) as bus:
         endpoints = bus.graph().settled(bus.connected, patience=FIND)
         began = time.monotonic()

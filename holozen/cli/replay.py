@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     channels = {channel for summary in summaries for channel in summary.streams}
     wire = connection.from_arguments(args)
     # Zenoh drops a sample after a millisecond in a full queue; samples of a bag may wait longer.
-    wire = wire.replace(cfg=(WAIT, *wire.cfg))
+    wire = wire._replace(cfg=(WAIT, *wire.cfg))
     with Bus("replay", wire, stop=stop) as bus:
         others = [endpoint for endpoint in bus.endpoints() if endpoint.session != bus.id]
         made = plan(channels, others, topics=args.topics, remap=dict(args.remap), commands=args.commands)

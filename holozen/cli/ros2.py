@@ -21,7 +21,7 @@ def run(args: argparse.Namespace) -> int:
     where, domain = connection.from_arguments(args), _domain(args)
     if where.secure:
         args.error("--secure: no certificate vouches for what ROS 2 nodes write, so they cannot be let in")
-    where = where.replace(cfg=(STAMPED, *where.cfg))
+    where = where._replace(cfg=(STAMPED, *where.cfg))
     from holozen.transport import rmw_zenoh, ros2dds
     from holozen.transport.ros_gateway import NODE, Gateway, open_bridges
 

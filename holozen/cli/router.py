@@ -12,7 +12,7 @@ from holozen.transport import connection
 def run(args: argparse.Namespace) -> int:
     """Route until Ctrl-C."""
     args.mode = args.mode or "router"
-    where = connection.from_arguments(args).replace(mode="router")
+    where = connection.from_arguments(args)._replace(mode="router")
     stop = stop_event()
     while not stop.is_set():
         members = _members(where)

@@ -100,11 +100,11 @@ def _meeting(where: connection.Connection) -> tuple[connection.Connection, list[
     if not where.secure or where.connect is not None or not os.path.isdir(os.path.join(where.secure, ROUTER)):
         return where, []
     listen = where.listen or where.meeting_points
-    clients = where.replace(listen=None, connect=(connection.from_here(listen[0]),))
+    clients = where._replace(listen=None, connect=(connection.from_here(listen[0]),))
     if is_taken(listen[0]):
         report(f"up: something listens at {listen[0]} already; assuming that it is the router")
         return clients, []
-    return clients, where.replace(mode="router", listen=listen).arguments()
+    return clients, where._replace(mode="router", listen=listen).arguments()
 
 
 class Team:

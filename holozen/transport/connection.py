@@ -9,7 +9,7 @@ import argparse
 import json
 import os
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 from holozen.flags import refused
 from holozen.suggest import suggest
@@ -32,7 +32,7 @@ LARGEST_MESSAGE = 20_000_000  # bytes, in the secure set-up; a description with 
 _RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5}
 
 
-class Connection:
+class Connection(NamedTuple):
     """Zenoh's flags, and how messages are encoded.
 
     `listen` and `connect`: None means the default, an empty tuple means no endpoint. The default is loopback, or with
@@ -40,31 +40,15 @@ class Connection:
     certificate it uses.
     """
 
-    def __init__(
-        self,
-        mode: str = "peer",
-        connect: tuple[str, ...] | None = None,
-        listen: tuple[str, ...] | None = None,
-        config: str | None = None,
-        cfg: tuple[tuple[str, str], ...] = (),
-        wire: str = "json",
-        private: str = "",
-        secure: str = "",
-        domain: int = 0,
-    ) -> None:
-        self.mode, self.connect, self.listen = mode, connect, listen
-        self.config, self.cfg, self.wire, self.private, self.secure = config, cfg, wire, private, secure
-        self.domain = domain
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Connection) and vars(self) == vars(other)
-
-    def __hash__(self) -> int:
-        return hash(tuple(vars(self).values()))
-
-    def replace(self, **changes: object) -> "Connection":
-        """A copy with some values changed."""
-        return Connection(**{**vars(self), **changes})
+    mode: str = "peer"
+    connect: tuple[str, ...] | None = None
+    listen: tuple[str, ...] | None = None
+    config: str | None = None
+    cfg: tuple[tuple[str, str], ...] = ()
+    wire: str = "json"
+    private: str = ""
+    secure: str = ""
+    domain: int = 0
 
     @property
     def where(self) -> str:

@@ -112,7 +112,7 @@ class Context:
     @property
     def connection(self) -> Connection:
         """How its nodes connect to others."""
-        return connection if self._domain_id is None else connection.replace(domain=self._domain_id)
+        return connection if self._domain_id is None else connection._replace(domain=self._domain_id)
 
     def shutdown(self) -> None:
         """End it. Raises RuntimeError if it was not initialized, or was shut down by anything but a signal."""

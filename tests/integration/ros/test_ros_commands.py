@@ -39,7 +39,7 @@ def test_a_command_that_is_not_finite_moves_nothing_and_is_counted(
     start_sim(wire)
     robot, accepted = Robot(wire.bus("watcher")), 0
     for count, (name, bad) in enumerate(zip(WIRES, (math.nan, math.inf, -math.inf), strict=True), 1):
-        monkeypatch.setattr(contexts, "connection", wire.connection.replace(wire=name))
+        monkeypatch.setattr(contexts, "connection", wire.connection._replace(wire=name))
         node = Node(f"tom_{name}", context=context)
         publisher = node.create_publisher(Twist, "cmd_vel", 10)
         wait_for(publisher.get_subscription_count)

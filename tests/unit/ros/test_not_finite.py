@@ -26,7 +26,7 @@ Spin = Callable[..., Any]
 @pytest.fixture(params=["json", "msgpack"])
 def used(request: pytest.FixtureRequest, ros: Wire, monkeypatch: pytest.MonkeyPatch) -> str:
     """The wire of the nodes: each that has no infinity, in turn."""
-    monkeypatch.setattr(context, "connection", ros.connection.replace(wire=request.param))
+    monkeypatch.setattr(context, "connection", ros.connection._replace(wire=request.param))
     return str(request.param)
 
 

@@ -409,7 +409,7 @@ def test_a_wrong_connection_is_one_line(wire: Wire) -> None:
         (Connection("router", listen=("tcp/192.0.2.1:7447",)), "cannot open Zenoh: cannot listen at tcp/192.0.2.1"),
         (Connection("client", connect=()), "cannot open Zenoh: a client needs --connect ENDPOINT"),
     ):
-        listening = connection.replace(listen=connection.listen or (wire.endpoint,))
+        listening = connection._replace(listen=connection.listen or (wire.endpoint,))
         assert refusal(partial(Bus, "test", listening, patience=0)).startswith(expected)
 
 

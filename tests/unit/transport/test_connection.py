@@ -35,6 +35,9 @@ connections = st.builds(
     config=st.none() | st.just("zenoh.json5"),
     cfg=st.lists(st.tuples(st.sampled_from(["transport/link/tx/lease", "mode"]), st.text())).map(tuple),
     wire=st.sampled_from(["json", "msgpack"]),
+    private=st.just(""),
+    secure=st.just(""),
+    domain=st.just(0),
 )
 
 
