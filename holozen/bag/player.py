@@ -104,7 +104,7 @@ def _publishers(key: str, endpoints: list[Endpoint]) -> str:
     return ", ".join(sorted({endpoint.node for endpoint in on_key(endpoints, key, "pub")}))
 
 
-class Way(NamedTuple):
+class Route(NamedTuple):
     """The key that a channel is played on, with its publisher and what stamps each message. `kinds` are the types of
     the commands that may come on it; `is_command`: all its messages are commands.
     """
@@ -144,22 +144,22 @@ class Outlet:
         self._tokens = [
             bus.announce("pub", channel.type or "any/msg/Any", key) for channel, key in plan.targets.items()
         ]
-        self._ways = {channel: self._way(bus, channel, key) for channel, key in plan.targets.items()}
+        self._routes = {channel: self._route(bus, channel, key) for channel, key in plan.targets.items()}
         self._stops: set[tuple[Channel, bytes, str]] = set()  # payloads, and their Encodings, for what now moves
         self.goals: set[str] = set()
         self.left_out: set[str] = set()
 
-    def _way(self, bus: Bus, channel: Channel, key: str) -> Way:
+    def _route(self, bus: Bus, channel: Channel, key: str) -> Route:
         is_command = key in self._plan.commands
         # Telemetry is batched: sent one by one, more of it is lost on a busy machine.
         publisher = bus.session.declare_publisher(key, encoding=channel.encoding, express=is_command)
-        return Way(key, publisher, bus.stamps(key), _kinds(channel, key), is_command)
+        return Route(key, publisher, bus.stamps(key), _kinds(channel, key), is_command)
 
     def settle(self) -> None:
         """Wait briefly for subscribers."""
         deadline = time.monotonic() + SETTLE
         while time.monotonic() < deadline:
-            if any(way.publisher.matching_status.matching for way in self._ways.values()):
+            if any(route.publisher.matching_status.matching for route in self._routes.values()):
                 return
             time.sleep(0.005)
 
@@ -167,21 +167,21 @@ class Outlet:
         """Send a message, if its channel is in the plan. Returns whether it was sent: a channel is left out from its
         first command on, unless commands are played.
         """
-        if not (way := self._ways.get(message.channel)):
+        if not (route := self._routes.get(message.channel)):
             return False
-        command = way.command(message)
+        command = route.command(message)
         if command is None:
-            way.put(message.payload)
+            route.put(message.payload)
         elif self._plan.moves:
-            way.put(_restamped(message, command))
+            route.put(_restamped(message, command))
             if (fields := wire.stop(command, command.ROS)) is not None:
                 self._stops.add((message.channel, *_encoded(type(command)(**fields), message.channel)))
-            if way.key.rpartition("/")[2] == GOALS:
-                self.goals.add(way.key)
+            if route.key.rpartition("/")[2] == GOALS:
+                self.goals.add(route.key)
         else:
             report(f"{message.channel.key} is left out from here on: {MOVES}")
             self.left_out.add(message.channel.key)
-            del self._ways[message.channel]
+            del self._routes[message.channel]
             return False
         return True
 
@@ -189,7 +189,7 @@ class Outlet:
         """Stop everything that was moved."""
         for _ in range(STOPS if self._stops else 0):
             for channel, payload, encoding in self._stops:
-                self._ways[channel].put(payload, encoding)
+                self._routes[channel].put(payload, encoding)
             time.sleep(STOP_EVERY)
         self._stops.clear()
 

@@ -152,16 +152,16 @@ class TwistInput(Input[Twist | TwistStamped]):
     """The velocity commands of one robot, clamped to `linear` (m/s) and `angular` (rad/s).
 
     Reports name the robot by `key`, its cmd_vel; `others` are additional command keys. With a `refusal`, all commands
-    but stops are refused for that reason. `lines` limits the reports of all robots that share it.
+    but stops are refused for that reason. `limit` bounds the reports of all robots that share it.
     """
 
     def __init__(
         self, key: str, arbiter: Arbiter, senders: Senders, linear: float, angular: float,
         report: Callable[[str], None] = report, others: tuple[str, ...] = (), refusal: str = "",
-        lines: Lines | None = None,
+        limit: ReportLimit | None = None,
     ) -> None:  # fmt: skip
         freshness: Freshness[Twist | TwistStamped] = Freshness((key, *others), senders, _stops, arbiter.moves)
-        super().__init__((key, *others), freshness, CommandStats(report, lines), (arbiter,))
+        super().__init__((key, *others), freshness, CommandStats(report, limit), (arbiter,))
         self.arbiter, self.linear, self.angular, self._always_refused = arbiter, linear, angular, refusal
         self._rates = SourceRates()
         # Whether there is a source that no status has named yet, or, while the sim is paused, any command: a process
@@ -347,14 +347,14 @@ class SourceRates:
         return sorted(rows, key=lambda row: (row[1], row[0]))
 
 
-class Lines:
-    """Limits the lines about refused commands: MAX_LINES a second, by all robots that share this."""
+class ReportLimit:
+    """Lets MAX_LINES reports of refused commands through in a second, by all robots that share it."""
 
     def __init__(self) -> None:
         self._since, self._written = -math.inf, 0
 
     def take(self, now: float) -> bool:
-        """Whether another line may be written at `now` (s)."""
+        """Whether another report may be written at `now` (s)."""
         if not 0 <= now - self._since < REPORT_EVERY:
             self._since, self._written = now, 0
         self._written += 1
@@ -364,8 +364,8 @@ class Lines:
 class CommandStats:
     """Counts accepted commands, and refused ones by kind. `last` is the last refusal."""
 
-    def __init__(self, report: Callable[[str], None] = report, lines: Lines | None = None) -> None:
-        self._lines = lines or Lines()
+    def __init__(self, report: Callable[[str], None] = report, limit: ReportLimit | None = None) -> None:
+        self._limit = limit or ReportLimit()
         self.accepted = 0
         self.refused: Counter[str] = Counter()
         self.last = ""
@@ -385,7 +385,7 @@ class CommandStats:
         self.refused[kind] += 1
         self.last = f"{source}: {reason}"[:300]
         self._unreported += 1
-        if now - self._reported < REPORT_EVERY or not self._lines.take(now):
+        if now - self._reported < REPORT_EVERY or not self._limit.take(now):
             return
         more = f" (and {self._unreported - 1} more)" if self._unreported > 1 else ""
         self._report(f"{key}: from {self.last}{more}")

@@ -165,15 +165,15 @@ def read_shape(tag: Tag, frame: Pose, source: Source) -> Shape | None:
     if shape.name == "mesh":
         return _mesh(shape, tag.name, pose, color, source)
     if shape.name == "plane":
-        upon = compose(pose, _upon(shape.direction("normal", UP)))
-        return Shape("plane", read_size(shape, (1.0, 1.0)), upon, color=color)
+        placed = compose(pose, _turned_to(shape.direction("normal", UP)))
+        return Shape("plane", read_size(shape, (1.0, 1.0)), placed, color=color)
     size = read_size(shape)
     if shape.name in SHAPES:
         return Shape(shape.name, size, pose, color=color)
     return Shape("hull", (), pose, color=color, points=tuple(_HULLS[shape.name](size)))
 
 
-def _upon(normal: Vector) -> Pose:
+def _turned_to(normal: Vector) -> Pose:
     """The rotation that takes z to `normal`."""
     x, y, z = normal
     return Pose(rpy=(0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x)))

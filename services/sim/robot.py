@@ -8,7 +8,7 @@ from functools import partial
 from holozen.bus import Bus
 from holozen.command.arbiter import Arbiter, CommandTime
 from holozen.command.freshness import Senders
-from holozen.command.inputs import CommandStats, ForceInput, JointInput, Lines, TwistInput
+from holozen.command.inputs import CommandStats, ForceInput, JointInput, ReportLimit, TwistInput
 from holozen.command.motion import JointMotion
 from holozen.command.stop_services import RobotServices
 from holozen.command.wait_set import Reader
@@ -29,7 +29,7 @@ from .schedule import Agenda, Schedule
 IDLE = 0.1  # s of sim time; how often it checks whether anyone reads the joints, while no one does
 
 Memory = tuple[Arbiter, Arbiter, Arbiter]
-LINES = Lines()  # of all robots
+REPORTS = ReportLimit()  # of all robots
 NO_DRIVE = "no drive: this robot is moved by forces, on {keys}"
 
 
@@ -64,7 +64,7 @@ class Robot:
         self._tf: Publisher[TFMessage] = bus.publisher(key_for("tf", namespace), TFMessage)
         refusal = "" if self.drives else NO_DRIVE.format(keys=listed(self._pushed_on))
         self._input = twist_input = TwistInput(
-            command, self.arbiter, senders, *limits, others=aliases(model, prefix), refusal=refusal, lines=LINES
+            command, self.arbiter, senders, *limits, others=aliases(model, prefix), refusal=refusal, limit=REPORTS
         )
         self._drive = DriveTopics(bus, prefix, name, drive, twist_input, self._tf) if drive else None
         if self._drive:
@@ -72,7 +72,7 @@ class Robot:
         pairs = ((self._wheels, self.arbiter), (self._others, self.joint_arbiter))
         self._obeys_joints = any(motors for motors, _ in pairs)
         groups = [(motors.names, arbiter) for motors, arbiter in pairs if motors]
-        stats = twist_input.stats if drive else CommandStats(lines=LINES)
+        stats = twist_input.stats if drive else CommandStats(limit=REPORTS)
         joint_input = JointInput(key_for("joint_command", namespace), senders, stats, groups, mover.names)
         force_input = ForceInput(tuple(self._pushed_on), self.force_arbiter, senders, stats)
         self._filters = (twist_input.freshness, joint_input.freshness, force_input.freshness)

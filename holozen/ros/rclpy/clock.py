@@ -98,8 +98,8 @@ class JumpHandle:
         self.unregister()
 
 
-class _Moves:
-    """Counts the events that wake all sleepers: a clock moved, or a context was shut down."""
+class _Sleepers:
+    """Those who sleep on a clock: all are woken when one moves, or a context is shut down."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -116,8 +116,8 @@ class _Moves:
             self._more.wait_for(lambda: self.count != seen, seconds)
 
 
-_moves = _Moves()
-_watched: WeakSet[Any] = WeakSet()  # contexts that notify `_moves` when they are shut down
+_sleepers = _Sleepers()
+_watched: WeakSet[Any] = WeakSet()  # contexts that notify `_sleepers` when they are shut down
 
 
 class Clock(HelpfulAttributes):
@@ -193,14 +193,14 @@ class Clock(HelpfulAttributes):
         context = _running(context)
         source = self._source()
         while True:
-            seen = _moves.count
+            seen = _sleepers.count
             if not context.ok() or self._source() != source or self.nanoseconds() < since:
                 return False
             wait = self.wait_seconds(until)
             if wait == 0.0:
                 return True
             # The system's clock may be set while it sleeps, so it looks now and then.
-            _moves.wait(seen, None if wait is None else min(wait, 1.0))
+            _sleepers.wait(seen, None if wait is None else min(wait, 1.0))
 
     def _source(self) -> bool:
         """Whether its time is simulated now."""
@@ -255,7 +255,7 @@ class ROSClock(Clock):
         for handle in concerned:
             if handle.after:
                 handle.after(jump)
-        _moves.notify()
+        _sleepers.notify()
         for watcher in list(self.watchers):
             watcher()
 
@@ -273,7 +273,7 @@ def _running(context: Any) -> Any:
 
         def notify() -> None:
             _watched.discard(context)
-            _moves.notify()
+            _sleepers.notify()
 
         context.on_shutdown(notify)
     return context

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holozen.command.arbiter import Arbiter
-from holozen.command.inputs import MAX_LINES, REPORT_EVERY, CommandStats, Lines, TwistInput
+from holozen.command.inputs import MAX_LINES, REPORT_EVERY, CommandStats, ReportLimit, TwistInput
 from holozen.command.motion import Motion
 from holozen.command.wait_set import Moment
 from holozen.limits import STOP
@@ -323,8 +323,8 @@ def test_a_command_whose_link_was_held_up_is_refused_and_counted(judge: Judge) -
 
 
 def test_a_fleet_reports_some_lines_a_second_and_counts_the_others() -> None:
-    lines, reports = Lines(), list[str]()
-    robots = [CommandStats(reports.append, lines) for _ in range(300)]
+    limit, reports = ReportLimit(), list[str]()
+    robots = [CommandStats(reports.append, limit) for _ in range(300)]
     for robot in robots:
         robot.refuse("Fred/cmd_vel", "old", "old: it was late", "pilot@1", 10.0)
     assert len(reports) == MAX_LINES
