@@ -2,8 +2,9 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from itertools import groupby, zip_longest
+
+from msgspec import Struct
 
 from holozen.limits import STOP, Planar
 from holozen.plotting import FARTHEST, Plane, Robot, drawn
@@ -12,8 +13,7 @@ Line = list[tuple[str, str]]
 """(style, text) from left to right; a style is "", "title", "driving", "good", "warning", "dim" or "alarm"."""
 
 
-@dataclass
-class Source:
+class Source(Struct):
     """A command source: its Zenoh priority, its rate (Hz), and how the sim treats it."""
 
     name: str
@@ -23,8 +23,7 @@ class Source:
     held: bool = False
 
 
-@dataclass
-class State:
+class State(Struct):
     """Everything that the screen shows, in m, rad, m/s, rad/s and s.
 
     Names and warnings came over the wire and may hold anything; they are made printable where they are drawn.
@@ -32,7 +31,7 @@ class State:
 
     robot: str = ""  # "" is the robot at the root
     name: str = ""  # in the sim; empty while it is not known
-    others: list[str] = field(default_factory=list)  # robots that Tab switches to
+    others: list[str] = []  # robots that Tab switches to
     mode: str = "hold"  # or "latch"
     why: str = ""  # how key releases are detected, or why they are not needed
     detached: bool = False  # whether no operator can see the terminal
@@ -48,8 +47,8 @@ class State:
     stale: bool = True
     round_trip: float | None = None  # to the sim and back; None: unknown
     real_time_factor: float | None = None
-    listeners: list[str] = field(default_factory=list)
-    sources: list[Source] = field(default_factory=list)  # command sources that the sim reports; may include ourselves
+    listeners: list[str] = []
+    sources: list[Source] = []  # command sources that the sim reports; may include ourselves
     obeyed: str = ""
     held: bool = False  # whether the autopilot is held until `resume`
     source: str = ""  # our own name
@@ -59,7 +58,7 @@ class State:
     trail: Sequence[tuple[float, float]] = ()  # oldest first
     warning: str = ""  # the latest
     key: str = "cmd_vel"
-    keys: list[str] = field(default_factory=list)  # help of the active layout, lines of at most 40 characters
+    keys: list[str] = []  # help of the active layout, lines of at most 40 characters
     help: bool = False  # whether the whole layout is shown in place of the picture
     ascii: bool = False  # for a terminal whose font has no braille
 

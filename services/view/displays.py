@@ -12,17 +12,7 @@ import viser
 
 from holozen.bus import Bus, Subscription
 from holozen.frames import RobotFrames
-from holozen.messages import (
-    CompressedImage,
-    Image,
-    LaserScan,
-    Message,
-    Odometry,
-    Path,
-    PointCloud2,
-    PointField,
-    Range,
-)
+from holozen.messages import CompressedImage, Image, LaserScan, Message, Odometry, Path, PointCloud2, PointField, Range
 from holozen.rotation import Transform
 from holozen.wire import key_for
 

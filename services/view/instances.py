@@ -6,12 +6,12 @@ That makes 0.2 MB for a hundred robots, instead of 20 MB with meshes for each of
 import math
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import viser
+from msgspec import Struct, field
 
 from holozen.robot.description import Appearance
 from holozen.robot.model import Joint, Link
@@ -24,8 +24,7 @@ GREY = (120, 120, 120)
 ARROW = Link("arrow", None, (), ())
 
 
-@dataclass(slots=True)
-class Body:
+class Body(Struct):
     """The pose of one entity, the positions of its joints in rad or m, and whether it is drawn in grey."""
 
     at: Transform = field(default_factory=Transform)

@@ -72,12 +72,7 @@ class Plots:
     """The plots of one page, drawn over the time (s) of `clock`."""
 
     def __init__(
-        self,
-        client: viser.ClientHandle,
-        place: Place,
-        bus: Bus,
-        scene: Scene,
-        clock: Callable[[], float],
+        self, client: viser.ClientHandle, place: Place, bus: Bus, scene: Scene, clock: Callable[[], float]
     ) -> None:
         self._client, self._place, self._bus, self._scene, self._clock = client, place, bus, scene, clock
         self._charts: list[Chart] = []

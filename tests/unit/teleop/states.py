@@ -1,8 +1,7 @@
 """States to show: one in which everything is wrong, and arbitrary ones."""
 
-from dataclasses import replace
-
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from services.teleop.view import Source, State
 from tests.unit.teleop.picture import scene

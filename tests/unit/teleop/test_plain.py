@@ -1,8 +1,7 @@
 """One line holds all that the screen shows."""
 
-from dataclasses import replace
-
 from hypothesis import given
+from msgspec.structs import replace
 
 from services.teleop.view import State, plain_line
 from tests.unit.teleop.picture import scene

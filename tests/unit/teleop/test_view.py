@@ -2,11 +2,11 @@
 
 import math
 import unicodedata
-from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from services.teleop.control.layout_file import load
 from services.teleop.view import Line, Source, State, render
