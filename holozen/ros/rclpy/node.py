@@ -22,7 +22,6 @@ from holozen.ros.rclpy.exceptions import ParameterUninitializedException
 from holozen.ros.rclpy.executors import Executor
 from holozen.ros.rclpy.handle import NamesAndTypes, NodeHandle, names_and_types
 from holozen.ros.rclpy.logging import RcutilsLogger
-from holozen.ros.rclpy.lookout import Lookout, is_of_robot
 from holozen.ros.rclpy.parameter import (
     PARAMETER_SEPARATOR_STRING,
     Callback,
@@ -37,6 +36,7 @@ from holozen.ros.rclpy.qos import QoSProfile, as_profile, qos_profile_default, q
 from holozen.ros.rclpy.service import Service
 from holozen.ros.rclpy.subscription import Subscription
 from holozen.ros.rclpy.timer import Rate, Timer
+from holozen.ros.rclpy.topic_check import TopicCheck, is_of_robot
 from holozen.ros.rclpy.waitable import GuardCondition, Waitable, check_callback
 from holozen.suggest import article
 from holozen.transport import session
@@ -92,7 +92,7 @@ class _State(NodeHandle):
         self._closing = threading.Lock()
         self._has_left = False
         self._calls: list[threading.Thread] = []
-        self._lookout: Lookout | None = None
+        self._topic_check: TopicCheck | None = None
         self._has_reported = False
         context.opened(self)
 
@@ -108,8 +108,8 @@ class _State(NodeHandle):
     def own(self, made: T) -> T:
         """Keep something until it, or the node, is destroyed."""
         self.owned.append(made)
-        if self._lookout is None and isinstance(made, Publisher | Subscription) and is_of_robot(made.topic):
-            self._lookout = Lookout(self)
+        if self._topic_check is None and isinstance(made, Publisher | Subscription) and is_of_robot(made.topic):
+            self._topic_check = TopicCheck(self)
         if self.executor is not None:
             self.executor.changed()
         return made
@@ -156,9 +156,9 @@ class _State(NodeHandle):
         self.is_closed = True
         owned, self.owned = self.owned, []
         self._calls += [thread for one in owned if isinstance(one, Client) for thread in one.threads()]
-        if self._lookout is not None:
-            self._lookout.cancel()
-            self._calls.append(self._lookout.thread)
+        if self._topic_check is not None:
+            self._topic_check.cancel()
+            self._calls.append(self._topic_check.thread)
         for one in owned:
             one.detach()
 

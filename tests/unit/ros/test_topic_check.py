@@ -7,14 +7,14 @@ import pytest
 from holozen.messages import Clock, Odometry, TFMessage, Twist
 from holozen.ros import rclpy
 from holozen.ros.generated import find
-from holozen.ros.rclpy import lookout
+from holozen.ros.rclpy import topic_check
 from holozen.testing import Wire, wait_for
 
 
 def test_topics_that_only_a_robot_with_a_name_has_are_logged_with_its_own(
     ros: Wire, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(lookout, "AFTER", 0.05)
+    monkeypatch.setattr(topic_check, "AFTER", 0.05)
     sim = ros.bus("sim", lasting=True)
     written = [sim.publisher("Fred/odom", Odometry), sim.publisher("Fred/tf", TFMessage), sim.publisher("clock", Clock)]
     read = [sim.subscribe("Fred/cmd_vel", Twist), sim.subscribe("*/cmd_vel", Twist)]

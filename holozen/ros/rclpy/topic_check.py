@@ -9,7 +9,7 @@ from holozen.ros.rclpy.waitable import Waker
 from holozen.transport.errors import BusError
 from holozen.transport.graph import Endpoint, on_key
 
-AFTER = 2.0  # s from a node's first topic of a robot to the look: nodes start one after the other
+AFTER = 2.0  # s from a node's first topic of a robot to the check: nodes start one after the other
 LACKS = {"sub": ("pub", "nothing publishes"), "pub": ("sub", "nothing reads")}
 """Kind of an endpoint -> that of its other end, and what there is without one."""
 
@@ -19,7 +19,7 @@ def is_of_robot(topic: str) -> bool:
     return wire.topic(names.key(topic)) is not None
 
 
-class Lookout:
+class TopicCheck:
     """Looks once, in a thread of its own, and logs the warning. Nothing is logged once it was cancelled."""
 
     def __init__(self, handle: NodeHandle) -> None:
@@ -28,7 +28,7 @@ class Lookout:
         self.thread.start()
 
     def cancel(self) -> None:
-        """End the wait for the look; takes no lock, as for a signal."""
+        """End the wait for the check; takes no lock, as for a signal."""
         self._cancelled.wake()
 
     def _look(self) -> None:
