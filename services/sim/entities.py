@@ -136,17 +136,9 @@ class Entities:
                 phase = len(self.robots) % BURSTS / BURSTS
                 keep_stop = partial(self._keep_stop, _place_of(model, prefix))
                 entity.robot = Robot(
-                    self._bus,
-                    name,
-                    prefix,
-                    model,
-                    mover,
-                    self.limits,
-                    self._clocks,
-                    phase,
-                    self.command_time,
+                    self._bus, name, prefix, model, mover, self.limits, self._clocks, phase, self.command_time,
                     keep_stop,
-                )
+                )  # fmt: skip
                 entity.robot.require_age(self.max_age)
                 if self._cameras and any(isinstance(sensor.device, Camera) for sensor in model.sensors):
                     self._cameras.start()
