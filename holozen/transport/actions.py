@@ -8,6 +8,7 @@ Source: ROS 2's design, "Actions"; codes and transitions are those of action_msg
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 import time
@@ -34,6 +35,7 @@ LONGEST = 86_400.0  # s of one request for a result
 GONE = 1.0  # s without a server after which the goal is lost
 POLL = 0.02  # s between two checks for it
 NO_ID = bytes(16)
+OLD = "it may have been sent more than {limit:g} s ago; send it again"
 
 
 class State(IntEnum):
@@ -220,7 +222,8 @@ class ActionServer(Goals):
 
     `refuses` returns why a goal is rejected, or "". Our clients receive the reason, those of ROS only the rejection.
     `begin` is called with this server and each accepted goal, and has to end the goal by `finish`. A goal that is to be
-    cancelled is CANCELING until then.
+    cancelled is CANCELING until then. A goal that was sent more than `max_age` seconds ago is rejected, and so is one
+    whose client no longer waits for the answer.
     """
 
     def __init__(
@@ -230,11 +233,12 @@ class ActionServer(Goals):
         action: Any,
         refuses: Callable[[Any], str],
         begin: Callable[[ActionServer, Goal], None],
+        max_age: float = math.inf,
     ) -> None:
         super().__init__(bus, key, action)
         from holozen.messages.action_msgs import CancelGoalReply, CancelGoalRequest
 
-        self._refuses, self._begin = refuses, begin
+        self._refuses, self._begin, self._max_age = refuses, begin, max_age
         send, result = action.Impl.SendGoalService, action.Impl.GetResultService
         self._result_type = result.Response
         self._goals = bus.serve(key_of(key, SEND), send.Request, send.Response, self._accept)
@@ -279,6 +283,13 @@ class ActionServer(Goals):
         reply = self._accepted()
         if reason := self.refusal(identity) or self._refuses(request.goal):
             return reply, reason
+        now = time.monotonic()
+        try:
+            self._goals.require_sent_after(now - self._max_age, now, OLD.format(limit=self._max_age))
+        except ServiceError as error:
+            if "outdated" in error.fields:
+                return reply, str(error)
+            raise
         now = time.time_ns()
         goal = self.accept(identity, now, request.goal)
         reply.accepted = True

@@ -17,6 +17,7 @@ from holozen.wire import key_for
 from .goto import Leg, Pose
 
 FEEDBACK_EVERY = 0.2  # s of the odom's clock
+MAX_AGE = 2.0  # s of a goal when it is accepted; an older one waited in a link, and what happened since is unknown
 MAX_POSES = 10_000  # of one goal, all loops included
 
 
@@ -133,7 +134,7 @@ class GoalServers:
             ("follow_waypoints", nav.FollowWaypoints, _looped),
         ):
             begin = partial(self._begin, name, kind, poses)
-            ActionServer(bus, key_for(name, robot), kind, partial(self._refuses, poses), begin).start()
+            ActionServer(bus, key_for(name, robot), kind, partial(self._refuses, poses), begin, MAX_AGE).start()
 
     def take(self) -> GoalJourney | None:
         """The newest accepted goal, which is returned only once; else None."""

@@ -1,5 +1,6 @@
 """A request that would let a robot move, and waited in a link while somebody stopped it, does not end the stop."""
 
+import json
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -12,9 +13,10 @@ from holozen.messages import CommandStatus, TriggerReply, TriggerRequest, Twist
 from holozen.messages import simulation_interfaces as si
 from holozen.messages.simulation_interfaces import SimulationState as State
 from holozen.testing import Process, Wire, wait_for
+from holozen.transport.actions import new_id
 from holozen.transport.connection import Connection
-from holozen.transport.errors import ServiceError
-from holozen.transport.services import SIMULTANEOUS
+from holozen.transport.errors import NoReply, ServiceError
+from holozen.transport.services import SIMULTANEOUS, call_bytes
 
 from .proxy import Proxy
 
@@ -64,10 +66,10 @@ def held_up(proxy: Proxy, ask: Callable[[], object], meanwhile: Callable[[], obj
     return str(refused.value)
 
 
-def pass_time() -> None:
+def pass_time(seconds: float = 2 * SIMULTANEOUS) -> None:
     """Let so much time pass that a request of now is older than what comes next."""
     began = time.monotonic()
-    wait_for(lambda: time.monotonic() > began + 2 * SIMULTANEOUS)
+    wait_for(lambda: time.monotonic() > began + seconds)
 
 
 def waits(proxy: Proxy) -> int:
@@ -75,25 +77,50 @@ def waits(proxy: Proxy) -> int:
     return sum(way.size for way in proxy.ways)
 
 
-def test_a_release_from_before_a_stop_leaves_the_robot_stopped(sim: Bus, far: Bus, proxy: Proxy) -> None:
-    trigger(sim, "stop")
-
+def test_a_release_from_before_a_stop_leaves_the_robot_stopped_also_where_it_was_stopped_already(
+    sim: Bus, far: Bus, proxy: Proxy
+) -> None:
     def stop_again() -> None:
         trigger(sim, "release")
         trigger(sim, "stop")
 
-    refused = held_up(proxy, lambda: trigger(far, "release"), stop_again)
-    assert refused == f"this release may have been sent before the last stop of the robot{AGAIN}"
-    status = sim.latest("cmd_vel_status", CommandStatus)
-    now = wait_for(lambda: status.read()[0])
-    assert now and now.stopped == sim.source
-    assert trigger(far, "release").message.startswith("sources that commanded")
+    for meanwhile in (stop_again, lambda: trigger(sim, "stop")):
+        trigger(sim, "stop")
+        refused = held_up(proxy, lambda: trigger(far, "release"), meanwhile)
+        assert refused == f"this release may have been sent before the last stop of the robot{AGAIN}"
+        status = sim.latest("cmd_vel_status", CommandStatus)
+        now = wait_for(lambda status=status: status.read()[0])  # type: ignore[misc]
+        assert now and now.stopped == sim.source
+        assert trigger(far, "release").message.startswith("sources that commanded")
 
 
-def test_so_does_one_while_the_stop_holds_that_somebody_else_has_confirmed(sim: Bus, far: Bus, proxy: Proxy) -> None:
-    trigger(sim, "stop")
-    refused = held_up(proxy, lambda: trigger(far, "release"), lambda: trigger(sim, "stop"))
-    assert refused.startswith("this release may have been sent before the last stop")
+def test_a_goal_that_is_old_or_whose_client_waits_no_longer_moves_nothing(
+    wire: Wire, sim: Bus, far: Bus, proxy: Proxy
+) -> None:
+    controller = wire.start("controller", "--laps", "0")
+    controller.wait_for_line("waiting for goal 0")
+
+    def send(wait: float, frame: str = "odom") -> str:
+        """Why a goal is rejected."""
+        goal = {"goal_id": {"uuid": [*new_id()]}, "goal": {"pose": {"header": {"frame_id": frame}}}}
+        sent = call_bytes(far, "navigate_to_pose/_action/send_goal", json.dumps(goal).encode(), "", wait)[0]
+        return sent.attachment.decode()
+
+    assert "its frame is 'moon'" in send(LONG, "moon")
+    proxy.stall()
+    with pytest.raises(NoReply):
+        send(0.1)
+    proxy.resume()
+    assert "its frame is 'moon'" in send(LONG, "moon")  # the goal before it was read before it
+    assert "navigate_to_pose" not in controller.err
+    proxy.stall()
+    with ThreadPoolExecutor() as pool:
+        sent = pool.submit(send, LONG)
+        pass_time(2.1)
+        proxy.resume()
+        assert sent.result() == "it may have been sent more than 2 s ago; send it again"
+    assert send(LONG) == ""
+    controller.wait_for_line("navigate_to_pose: (0.00, 0.00) by far")
 
 
 def test_a_resume_from_before_a_person_drove_leaves_the_autopilot_held(sim: Bus, far: Bus, proxy: Proxy) -> None:
