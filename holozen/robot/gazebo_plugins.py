@@ -61,6 +61,7 @@ def file_of(plugin: Tag) -> str:
 # Settings: the elements inside a plugin or `<gazebo reference>`, in the spelling of ROS 1, ROS 2, or a mix of both.
 
 
+LONG_TIMEOUT = 2.0  # s; a robot that drives on for longer without a command causes a warning
 SMALLEST = 1e-3  # m; smallest wheel radius, and distance between wheels
 
 PUBLISHED_TOO = ("tf", "joint_states")  # by drives in Gazebo; here they have these names
@@ -727,6 +728,7 @@ def read_plugins(
         for plugin in publishers:
             source.warn(plugin, "publishes odometry, but the robot has no drive")
         return None
+    _warn_of_timeout(drive, Settings(driver), source)
     for plugin in publishers:
         drive, driver = with_publisher(drive, Settings(plugin)), plugin
     return _with_known_frame(drive, driver, links, root, source)
@@ -751,6 +753,14 @@ def _warn_not_run(plugin: Tag, kind: str, source: Source) -> None:
         others = [file for file in known if known[file] != kind]
         near = source.suggest(file_name(kind), others, lambda file: known[file].removeprefix("gazebo_ros_"), alike=0.8)
         source.warn(plugin, f"({shorten(file_of(plugin)) or 'no filename'}) is unknown and is ignored{near}")
+
+
+def _warn_of_timeout(drive: Drive, settings: Settings, source: Source) -> None:
+    if not 0 < drive.command_timeout <= LONG_TIMEOUT:
+        tag = settings.tag("cmd_timeout", "command_timeout")
+        long = "for ever" if drive.command_timeout < 0 else f"for {drive.command_timeout:g} s"
+        problem = f"is {cut(tag.value())}: a robot whose driver hangs, or whose link is cut, drives on {long}"
+        source.warn(tag, f"{problem}; without this element it stops after {COMMAND_SILENCE:g} s")
 
 
 def _with_known_frame(drive: Drive, plugin: Tag, links: Mapping[str, Link], root: str, source: Source) -> Drive:

@@ -106,9 +106,16 @@ def test_of_two_equal_tags_the_first_counts_and_an_empty_one_has_no_effect() -> 
     assert (drive(tags).odometry_rate, drive(tags).odometry_frame) == (30, "odom")
 
 
-def test_a_negative_timeout_switches_the_watchdog_off() -> None:
-    assert drive("<cmdTimeout>-1</cmdTimeout>").command_timeout == -1
-    assert drive("<cmd_timeout>-0.2</cmd_timeout>").command_timeout == -1
+def test_a_negative_timeout_switches_the_watchdog_off_which_is_reported_as_a_long_one_is() -> None:
+    for name, text, timeout, long in (
+        ("cmdTimeout", "-1", -1, "for ever"), ("cmd_timeout", "-0.2", -1, "for ever"), ("cmdTimeout", "60", 60, "for 60 s"),
+    ):  # fmt: skip
+        model = robot(plugin(f"<{name}>{text}</{name}>"))
+        assert model.drive is not None and model.drive.command_timeout == timeout
+        on = f"a robot whose driver hangs, or whose link is cut, drives on {long}"
+        message = f"<{name}> of <plugin name='drive'> is '{text}': {on}; without this element it stops after 0.5 s"
+        assert model.warnings == (f"{ORIGIN}, line 3: {message}",)
+    assert drive("<cmdTimeout>2</cmdTimeout>").command_timeout == 2  # without a warning
 
 
 def test_a_base_frame_that_is_no_link_is_reported_and_the_root_is_taken() -> None:
