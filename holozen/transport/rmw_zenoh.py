@@ -23,6 +23,7 @@ TOPIC = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 QOS = "::,10:,:,:,,"  # ROS 2's default: reliable, volatile, the last 10
 LATCHED_QOS = ":1:,1:,:,:,,"  # transient local, the last one
 PACE = 0.3  # s between two samples that show that their publisher keeps pace
+JUMP = 0.5  # s; a sample that is faster by more than any before it shows that its sender's clock was set ahead
 KINDS = {"MP": "pub", "MS": "sub", "SS": "srv"}
 NO_HASH = "TypeHashNotSupported"  # in the place of hashes in ROS 2 Humble
 _CODES = {kind: code for code, kind in KINDS.items()}
@@ -181,7 +182,7 @@ class Ages:
         """
         sent = stamp.sent / 1e9
         number, before = self._last
-        if stamp.number > number and sent < before:  # the sender's clock was set back
+        if stamp.number > number and (sent < before or now - sent < self._offset - JUMP):  # their clock was set
             self.kept_pace, self._offset, self._begun = False, math.inf, None
         self._last = (stamp.number, sent)
         self._offset = min(self._offset, now - sent)

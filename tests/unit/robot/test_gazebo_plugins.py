@@ -108,8 +108,10 @@ def test_of_two_equal_tags_the_first_counts_and_an_empty_one_has_no_effect() -> 
 
 def test_a_negative_timeout_switches_the_watchdog_off_which_is_reported_as_a_long_one_is() -> None:
     for name, text, timeout, long in (
-        ("cmdTimeout", "-1", -1, "for ever"), ("cmd_timeout", "-0.2", -1, "for ever"), ("cmdTimeout", "60", 60, "for 60 s"),
-    ):  # fmt: skip
+        ("cmdTimeout", "-1", -1, "for ever"),
+        ("cmd_timeout", "-0.2", -1, "for ever"),
+        ("cmdTimeout", "60", 60, "for 60 s"),
+    ):
         model = robot(plugin(f"<{name}>{text}</{name}>"))
         assert model.drive is not None and model.drive.command_timeout == timeout
         on = f"a robot whose driver hangs, or whose link is cut, drives on {long}"
