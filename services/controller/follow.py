@@ -11,13 +11,14 @@ from holozen.messages import CommandStatus, NextGoalReply, NextGoalRequest, Odom
 from holozen.messages.message import not_finite
 from holozen.odometry import RobotFeedback
 from holozen.suggest import listed, suggest
+from holozen.transport.actions import OLD
 from holozen.transport.errors import NoReply, ServiceError
-from holozen.transport.graph import Endpoint
-from holozen.transport.pubsub import Publisher
+from holozen.transport.graph import Endpoint, quoted
+from holozen.transport.pubsub import Publisher, Received
 from holozen.wire import COMMAND_SILENCE, PRIORITY_OF, key_for, resume_command
 
 from .goto import Gains, Leg, Pose, arrived, error, velocity
-from .journeys import GoalServers, Journey
+from .journeys import MAX_AGE, GoalServers, Journey
 
 PERIOD = 0.05  # s of the odom's clock between two commands
 PATIENCE = 0.5  # s between two attempts to reach a service
@@ -120,7 +121,10 @@ class Follower:
         self._odom = RobotFeedback(bus, key_for("odom", robot))
         self.status = bus.latest(key_for("cmd_vel_status", robot), CommandStatus)
         self._commands: Publisher[Twist] = bus.publisher(key_for("cmd_vel", robot), Twist, PRIORITY_OF["controller"])
-        self._goals = bus.subscribe(key_for("goal_pose", robot), PoseStamped, depth=1, limit=LARGEST_GOAL)
+        self._goal_key = key = key_for("goal_pose", robot)
+        self._goals = bus.subscribe(key, PoseStamped, depth=1, limit=LARGEST_GOAL)
+        self._senders = bus.graph(f"@holozen/*/*/pub/*/*/*/{quoted(key)}")
+        self._clocks = bus.peer_clocks(self._senders.has)
         self._wanted: Journey | None = None  # the present one, of goal_pose or an action
         self._backlog = Backlog()
         self._actions = GoalServers(bus, robot, self._refusal, report)
@@ -174,10 +178,13 @@ class Follower:
         this process, or in a link, is refused: what happened to the robot meanwhile is unknown.
         """
         is_silent = self._odom.count > 0 and self._odom.read()[1] > self._odom.patience(SUSPENDED)
-        late = self._backlog.look(time.monotonic(), is_silent)
+        late = self._backlog.look(now := time.monotonic(), is_silent)
+        self._clocks.track(self._senders.publishers(self._goal_key), now)
+        self._clocks.poll(now)
         received = self._goals.try_recv()
         if received is not None:
-            if reason := received.error or late or (received.message and self._refusal(received.message)):
+            refusal = received.error or late or self._age_refusal(received, now)
+            if reason := refusal or (received.message and self._refusal(received.message)):
                 self._report(f"goal_pose: refused: {reason}")
             elif goal := received.message:
                 x, y, theta = goal.pose.planar()
@@ -191,6 +198,12 @@ class Follower:
             self._set_out(journey, "a newer goal came")
             journey.begin()
         return self._wanted
+
+    def _age_refusal(self, received: Received[PoseStamped], now: float) -> str:
+        """Why a goal is too old, by the clock of its sender; empty if it is not, or that clock is unknown."""
+        stamp = received.stamp
+        ages = stamp and self._clocks.ages(stamp.session, stamp.sent, now, stamp.member)
+        return OLD.format(limit=MAX_AGE) if ages and ages[0] > MAX_AGE else ""
 
     def _set_out(self, journey: Journey, why: str) -> None:
         if self._wanted:

@@ -9,7 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import pytest
 
 from holozen.bus import Bus
-from holozen.messages import CommandStatus, TriggerReply, TriggerRequest, Twist
+from holozen.messages import CommandStatus, PoseStamped, TriggerReply, TriggerRequest, Twist
 from holozen.messages import simulation_interfaces as si
 from holozen.messages.simulation_interfaces import SimulationState as State
 from holozen.testing import Process, Wire, wait_for
@@ -99,6 +99,7 @@ def test_a_goal_that_is_old_or_whose_client_waits_no_longer_moves_nothing(
 ) -> None:
     controller = wire.start("controller", "--laps", "0")
     controller.wait_for_line("waiting for goal 0")
+    poses = far.publisher("goal_pose", PoseStamped)
 
     def send(wait: float, frame: str = "odom") -> str:
         """Why a goal is rejected."""
@@ -113,12 +114,17 @@ def test_a_goal_that_is_old_or_whose_client_waits_no_longer_moves_nothing(
     proxy.resume()
     assert "its frame is 'moon'" in send(LONG, "moon")  # the goal before it was read before it
     assert "navigate_to_pose" not in controller.err
+    for _ in range(3):  # the controller has read two answers, and knows our clock
+        far.clock_asked.clear()
+        assert far.clock_asked.wait(LONG)
     proxy.stall()
     with ThreadPoolExecutor() as pool:
+        poses.put(PoseStamped())
         sent = pool.submit(send, LONG)
-        pass_time(2.1)
+        pass_time(3.5)  # 2, and a second between two looks of a controller that waits for its list
         proxy.resume()
         assert sent.result() == "it may have been sent more than 2 s ago; send it again"
+    controller.wait_for_line("goal_pose: refused: it may have been sent more than 2 s ago; send it again")
     assert send(LONG) == ""
     controller.wait_for_line("navigate_to_pose: (0.00, 0.00) by far")
 
