@@ -45,7 +45,7 @@ ROLES = {
     "sim": Role("", EVERY, (*READS, CLOCK), EVERY, (NODES,)),
     "operator": Role("REAL_TIME", COMMANDS, EVERY, _OWN, _DRIVES),
     "autopilot": Role(
-        "DATA_LOW", (*COMMANDS, *ACTIONS), (*READS, "**/next_goal", STOP, *ACTIONS), (*_OWN, *_GOALS, *ACTIONS),
+        "DATA_LOW", (*COMMANDS, *ACTIONS), (*READS, CLOCK, "**/next_goal", STOP, *ACTIONS), (*_OWN, *_GOALS, *ACTIONS),
         (*_DRIVES, *(f"@holozen/*/*/srv/*/*/*/{key}" for key in (*_GOALS, *ACTIONS)),
          *(f"@holozen/*/*/pub/*/*/*/{key}" for key in ACTIONS)),
     ),

@@ -3,6 +3,7 @@
 import contextlib
 import os
 import socket
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -149,9 +150,15 @@ def test_cameras_are_seen_by_all_and_forces_push_by_role(fleet: Fleet, robot: Ro
     entities.delete(robot.bus, "seeing")
 
 
-def test_an_autopilot_checks_who_sets_its_goals(fleet: Fleet, robot: Robot) -> None:
+def test_an_autopilot_checks_who_sets_its_goals_and_how_old_they_are(fleet: Fleet, robot: Robot) -> None:
     with fleet.bus("autopilot") as pilot, fleet.bus("operator") as operator, fleet.tool("script") as script:
         goals, setter = pilot.subscribe("goal_pose", PoseStamped), operator.publisher("goal_pose", PoseStamped)
+        clocks = pilot.peer_clocks(lambda _session: True)
+
+        def dated() -> bool:
+            clocks.track([operator.id], now := time.monotonic())
+            clocks.poll(now)
+            return clocks.ages(operator.id, now, now, "operator") is not None
 
         def proven() -> bool:
             setter.put(PoseStamped())
@@ -163,6 +170,7 @@ def test_an_autopilot_checks_who_sets_its_goals(fleet: Fleet, robot: Robot) -> N
 
         wait_for(proven)
         wait_for(unproven)
+        wait_for(dated)
 
 
 def test_an_autopilot_drives_at_its_priority(fleet: Fleet, robot: Robot) -> None:
