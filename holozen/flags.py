@@ -183,7 +183,7 @@ def pair(text: str) -> tuple[str, str]:
     """Parses name:=value."""
     name, assign, value = (part.strip() for part in text.partition(":="))
     if not assign or not name:
-        raise refused(f"{text!r}: write {assigned([text]) or 'name:=value'}")
+        raise refused(f"{text!r}: write {assigned([text]) or 'name:=value after the one FILE'}")
     return name, value
 
 

@@ -64,7 +64,8 @@ def suggest_file(path: Path) -> str:
     found = dict[str, Path]()
     for ours in ("", "urdf", "worlds"):
         with suppress(OSError):
-            for file in sorted((data.find(ours) if ours else path.parent).iterdir()):
+            files = (data.find(ours) if ours else path.parent).iterdir()
+            for file in sorted(files, key=lambda file: (file.suffix != path.suffix, file)):
                 if file.suffix in ROBOT_FILES:
                     found.setdefault(file.name, file)
     best = closest(path.name, found, lambda name: name.partition(".")[0])

@@ -39,7 +39,7 @@ from holozen.robot.gazebo_plugins import DRIVES, FORCE, OMNI, kind_of
 from holozen.robot.packages import readable
 from holozen.robot.sources import handlers
 from holozen.robot.xacro import XacroFile
-from holozen.suggest import shorten
+from holozen.suggest import listed, shorten
 
 # The rules.
 
@@ -186,11 +186,13 @@ def _summary(subject: Subject) -> str:
     parts = [_counted(len(subject.links), "link")]
     if subject.wheels:
         parts.append(_counted(len(subject.wheels), "wheel"))
-    drive = subject.model.drive if subject.model else None
-    if drive is not None:
-        plugin = next(kind for plugin in subject.plugins if (kind := kind_of(plugin)) in MOVING)
-        parts.append(f"{plugin.removeprefix('gazebo_ros_')} on {drive.command_topic}")
-    elif subject.links and not (subject.model and subject.model.static):
+    model = subject.model
+    if model and model.drive:
+        kinds = [kind for plugin in subject.plugins if (kind := kind_of(plugin)) in MOVING]
+        plugin = next((kind for kind in kinds if kind != FORCE), FORCE)
+        topics = [force.topic for force in model.forces] if plugin == FORCE else [model.drive.command_topic]
+        parts.append(f"{plugin.removeprefix('gazebo_ros_')} on {listed(topics)}")
+    elif subject.links and not (model and model.static):
         parts.append("no drive: holozen spawn --drive planar_move moves it as a whole")
     return ", ".join(parts)
 

@@ -72,8 +72,8 @@ def _circles(subject: Subject, roots: list[str]) -> Iterator[Mistake]:
     children: dict[str, list[str]] = {}
     for joint in subject.root.all("joint"):
         parent, child = (joint.first(end) for end in ("parent", "child"))
-        if parent and child:
-            children.setdefault(_end(parent), []).append(_end(child))
+        if child:
+            children.setdefault(_end(parent) if parent else "", []).append(_end(child))
     waiting = [*roots, *(name for name in children if name not in subject.links)]
     reached = set(waiting)
     while waiting:

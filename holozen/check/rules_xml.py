@@ -74,6 +74,7 @@ MISPLACED = {
 """Element -> the elements that it belongs in; parsers silently ignore it anywhere else."""
 
 IGNORED = {
+    "include": 'write <xacro:include filename="..."/>',
     "surface": 'write <gazebo reference="LINK"> with <mu1> and <mu2> in it, next to the links',
     "pose": 'write <origin xyz="..." rpy="..."/> in the joint, inertial, visual or collision',
     "joint_properties": 'write <dynamics damping="..." friction="..."/>',

@@ -141,7 +141,7 @@ class Tag(Struct, eq=False):
         for word in text.split():
             value = number(word)
             if value is None:
-                problem = "is not a finite number; write numbers such as 0.25, separated by spaces"
+                problem = f"is not a finite number; {_as_number(word)}"
             elif abs(value) > most:
                 problem = f"is beyond {most:g}; use metres, kilograms and radians"
             else:
@@ -290,7 +290,8 @@ def read_text(path: Path) -> str:
         check_file(path)
         return path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise RobotError(f"{path}: byte {error.start} is not UTF-8 text; save the file as UTF-8") from None
+        line = error.object.count(b"\n", 0, error.start) + 1
+        raise RobotError(f"{path}, line {line}: byte {error.start} is not UTF-8 text; save the file as UTF-8") from None
     except OSError as error:
         raise RobotError(f"{path}: {error.strerror or error}{suggest_file(path)}") from None
     except RobotError:
@@ -343,6 +344,8 @@ class _Reader:
 
 _CASES = (
     (re.compile("[\u2018-\u201f]"), "replace the curly quotes with straight ones"),
+    (re.compile("[\u00a0\u200b\u202f]"), "replace the no-break spaces, which look like spaces, with plain ones"),
+    (re.compile(r"^\{\\rtf"), "this is rich text: save the file as plain text"),
     (re.compile(r"&(?!#?\w+;)"), "write & as &amp;"),
     (re.compile(r"<!--(?:(?!-->).)*--(?!>)"), "a comment must not contain -- before its end"),
     (re.compile(r"""\s[\w:.-]+\s*=\s*(?!["'\s])"""), 'put the value in quotes: name="value"'),
@@ -352,6 +355,15 @@ _CASES = (
     (re.compile(r"""(?:"[^"]*"|'[^']*')[\w:.-]+\s*="""), "put a space between two attributes"),
     (re.compile(r"<\s+\w|<\d"), "no space and no digit may follow <"),
 )  # fmt: skip
+
+
+def _as_number(word: str) -> str:
+    """How to correct a word that is not a number."""
+    if word.startswith(("\u2212", "\u2013")):
+        return f"write -{word[1:]}, with the minus sign of the keyboard"
+    if re.search(r"[{}()*/]|pi", word):
+        return "write a number, or ${...} in a xacro file"
+    return "write numbers such as 0.25, separated by spaces"
 
 
 def broken_xml(error: expat.ExpatError, text: str, context: str) -> str:

@@ -89,7 +89,7 @@ def keep_places(file: Callable[[], str]) -> None:
 MAX_CALLS = 5_000  # of macros, blocks and includes; the library takes 1 s for this many, and superlinear time for more
 # These differ between processes: string hashes, set order, and generated names.
 _IMPURE = re.compile(r"\b(hash|set|frozenset|anon)\b")
-_NAME, _COMMA = re.compile(r"[A-Za-z_]\w*"), re.compile(r"[-+]?\d+,\d+")
+_NAME, _NUMBER = re.compile(r"[A-Za-z_]\w*"), re.compile(r"[-+]?\d*\.?\d+")
 
 
 class Trace:
@@ -101,6 +101,7 @@ class Trace:
         self.place: Place | None = None
         self.pure = True
         self._element: Any = None
+        self._macros: Any = None
         self._elements = self._calls = 0
         self._wrap()
 
@@ -167,7 +168,7 @@ class Trace:
 
     def _calling(self, function: Any) -> Any:
         def wrapped(node: Any, macros: Any, symbols: Any) -> Any:
-            name = node.tagName
+            name, self._macros = node.tagName, macros
             if not name.startswith("xacro:") or name == "xacro:call":
                 self._enter(node)
                 return function(node, macros, symbols)
@@ -228,8 +229,8 @@ class Trace:
                 if error.name and tables and not hasattr(error, "hint"):
                     node, name = self._element, error.name
                     plain = _in_plain_macro(node) or _plain(node, "property", name)
-                    near = plain or _further_down(node, "property", name) or suggest(name, names(tables[0]))
-                    error.hint = near  # type: ignore[attr-defined]
+                    elsewhere = plain or _further_down(node, "property", name) or _in_a_macro(self._macros, name)
+                    error.hint = elsewhere or suggest(name, names(tables[0]))  # type: ignore[attr-defined]
                 raise
             except TypeError as error:
                 if tables and not hasattr(error, "hint"):
@@ -270,8 +271,23 @@ def _plain(node: Any, kind: str, name: str) -> str:
 def _further_down(node: Any, kind: str, name: str) -> str:
     """A hint for a name whose definition comes later: what xacro has read is no longer in the document."""
     found = _named(node, f"xacro:{kind}", name)
-    place = place_of(found) if found is not None and found.parentNode.nodeName != "xacro:macro" else None
+    if found is not None and found.parentNode.nodeName == "xacro:macro":
+        return _only_in(found.parentNode.getAttribute("name")) if kind == "property" else ""
+    place = place_of(found) if found is not None else None
     return f"; it is defined further down, in line {place.line}: move that up" if place else ""
+
+
+def _in_a_macro(macros: Any, name: str) -> str:
+    """A hint for a name that only a macro has: one of its parameters, or a property in it."""
+    for macro in names(macros):
+        own = macros[macro].body.getElementsByTagName("xacro:property")
+        if name in macros[macro].params or any(each.getAttribute("name") == name for each in own):
+            return _only_in(macro)
+    return ""
+
+
+def _only_in(macro: str) -> str:
+    return f"; it is known only inside the macro {shorten(macro)!r}"
 
 
 def _no_number(expression: str, table: Any) -> str:
@@ -282,8 +298,9 @@ def _no_number(expression: str, table: Any) -> str:
         except Exception:  # no property, or one that cannot be evaluated, which has its own error
             continue
         if isinstance(value, str):
-            point = f"; write {value.strip().replace(',', '.')}" if _COMMA.fullmatch(value.strip()) else ""
-            return f"; {name} is the text {shorten(repr(value), 80)}, not a number{point}"
+            plain = value.strip().translate(str.maketrans(",\u2212\u2013", ".--"))
+            write = f"; write {plain}" if _NUMBER.fullmatch(plain) else ""
+            return f"; {name} is the text {shorten(repr(value), 80)}, not a number{write}"
     return ""
 
 
@@ -330,6 +347,8 @@ def describe(error: BaseException, trace: Trace, path: Path, guesses: Mapping[st
     hint = getattr(cause, "hint", "") or (_guessed(guesses) if isinstance(cause, OSError) else "")
     if type(cause).__name__ == "ArgException":
         hint = suggest(str(cause), list(args))
+    elif isinstance(cause, OSError) and "package://" in str(cause.filename):
+        hint = "; xacro:include has no package://; write $(find PACKAGE)/..."
     elif found := _NO_COMMAND.match(str(cause)):
         hint = suggest(found[1].split()[0], COMMANDS) or f"; to calculate, write ${{{shorten(found[1], 80)}}}"
     return f"{_where(cause, trace)}: {_reason(cause, suffix)}{hint}{chain}"

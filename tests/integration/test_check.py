@@ -34,6 +34,13 @@ def test_a_good_file_is_summed_up_in_one_line(run: Verb, tmp_path: Path) -> None
     (tmp_path / "r.urdf").write_text(WARNS.replace("9", "0.004"))
     omni = "ok: 40 links, holozen_omni_drive on cmd_vel\n"  # wheels whose collision shapes are those of rollers
     assert run(str(data.find("urdf", "omni.urdf.xacro"))).stdout == omni
+    force = (
+        '<plugin name="f" filename="libgazebo_ros_force.so"><bodyName>a</bodyName><topicName>push</topicName></plugin>'
+    )
+    (tmp_path / "f.urdf").write_text(
+        WARNS.replace("9", "0.004").replace("</robot>", f"<gazebo>{force}</gazebo></robot>")
+    )
+    assert run(str(tmp_path / "f.urdf")).stdout == "ok: 1 link, force on push\n"
     expected = "ok: 1 link, no drive: holozen spawn --drive planar_move moves it as a whole\n"
     assert run(str(tmp_path / "r.urdf")).stdout == expected
     assert run(str(data.find("urdf", "materials.xacro"))).stdout.startswith(

@@ -28,8 +28,14 @@ def test_a_missing_robot_file_gets_the_closest_in_its_folder_or_among_ours(
 ) -> None:
     mine = tmp_path / "my_bot.urdf.xacro"
     mine.touch()
-    (tmp_path / "my_bto.txt").touch()
-    for name, near in (("my_bto.urdf.xacro", mine), ("my_bot", mine), ("hb_bot", "urdf/hb_bot.urdf.xacro")):
+    for other in ("my_bto.txt", "my_bot.urdf"):
+        (tmp_path / other).touch()
+    for name, near in (
+        ("my_bto.urdf.xacro", mine),
+        ("my_bto.xacro", mine),
+        ("my_bto.urdf", tmp_path / "my_bot.urdf"),
+        ("hb_bot", "urdf/hb_bot.urdf.xacro"),
+    ):
         word = str(tmp_path / name)
         for verb in (["check"], ["check", "--fix"], ["spawn"], ["xacro"], ["sim", "--robot"]):
             assert main([*verb, word]) == 1

@@ -39,6 +39,10 @@ def test_a_wrong_word_is_reported_with_the_closest(run: Run) -> None:
         ),
         ("spawn a.urdf radius=0.1", "holozen spawn: 'radius=0.1': write radius:=0.1; "),
         ("xacro a.xacro radius=0.1", "holozen xacro: argument name:=value: 'radius=0.1': write radius:=0.1; "),
+        (
+            "check a.urdf b.urdf",
+            "holozen check: argument name:=value: 'b.urdf': write name:=value after the one FILE; ",
+        ),
         ("launch a.launch.py robot=Rosie", "holozen launch: 'robot=Rosie': write robot:=Rosie; "),
         ("spawn a.urdf --nmae Fred", "holozen spawn: no flag '--nmae' (did you mean '--name'?); "),
         (

@@ -80,7 +80,7 @@ def test_values_may_stand_on_both_sides_of_the_flags(file: Path, capsys: pytest.
             'add xmlns:xacro="http://www.ros.org/wiki/xacro" to <robot>, '
             "or that of another prefix",
         ),
-        (b"\x7fELF\xff\x00", "robot.xacro: byte 4 is not UTF-8 text; save the file as UTF-8"),
+        (b"\x7fELF\xff\x00", "robot.xacro, line 1: byte 4 is not UTF-8 text; save the file as UTF-8"),
         (
             b"\x00\x00",
             "robot.xacro, line 1: broken XML: not well-formed (invalid token); "

@@ -228,7 +228,7 @@ def test_a_file_that_is_no_world_is_named_with_the_reason(path: Path) -> None:
         (b"", ": the file is empty; a robot is a <robot> or an <sdf>, a world an <sdf>"),
         (b"\0", ", line 1: broken XML: "),
         (b"<sdf>&evil;</sdf>", ", line 1: broken XML: undefined entity"),
-        (b"<sdf>\xff</sdf>", ": byte 5 is not UTF-8 text; save the file as UTF-8"),
+        (b"<sdf>\xff</sdf>", ", line 1: byte 5 is not UTF-8 text; save the file as UTF-8"),
         (b'<robot name="r"/>', ", line 1: <robot name='r'> is a robot (URDF), not a world; pass it to"),
         (b"<sdf/>", ", line 1: <sdf> holds no <world>"),
         (b'<sdf><model name="m"/></sdf>', ", line 1: <sdf> contains a model but no <world>; add it to a running world"),

@@ -207,6 +207,7 @@ def test_every_other_failure_is_one_line_with_the_file(folder: Path) -> None:
             '<property name="r" value="1"/><link name="${r}"/>',
             "; <property> lacks its prefix: write <xacro:property ...>",
         ),
+        ('<xacro:include filename="package://holo/a.xacro"/>', "has no package://; write $(find PACKAGE)/..."),
         ('<xacro:if value="maybe"/>', "not a boolean expression"),
         ("<xacro:macro/>", "missing attribute 'name'"),
         ('<xacro:insert_block name="b"/>', 'Undefined block "b"'),
@@ -228,6 +229,22 @@ def test_a_misspelt_name_is_reported_with_one_that_looks_alike(folder: Path) -> 
         (
             '<l n="${r}"/>\n<xacro:property name="r" value="1"/>',
             "'r'; it is defined further down, in line 3: move that up",
+        ),
+        (
+            '<xacro:macro name="wheel" params="name"><a/></xacro:macro><l n="${name}"/>',
+            "'name'; it is known only inside the macro 'wheel'",
+        ),
+        (
+            '<l n="${r}"/><xacro:macro name="m"><xacro:property name="r" value="1"/></xacro:macro>',
+            "'r'; it is known only inside the macro 'm'",
+        ),
+        (
+            '<xacro:macro name="m"><xacro:property name="r" value="1"/></xacro:macro><l n="${r}"/>',
+            "'r'; it is known only inside the macro 'm'",
+        ),
+        (
+            '<xacro:property name="y" value="\u22121"/><l n="${y/2}"/>',
+            "y is the text '\u22121', not a number; write -1",
         ),
         (
             '<xacro:m/>\n<xacro:macro name="m"><a/></xacro:macro>',
@@ -290,7 +307,8 @@ def test_a_missing_library_is_reported_with_the_way_to_get_it(folder: Path, monk
 def test_a_file_that_cannot_be_read_is_reported(folder: Path) -> None:
     assert failure(folder / "gone.urdf") == f"{folder}/gone.urdf: No such file or directory"
     assert failure(folder) == f"{folder}: Is a directory"
-    (folder / "latin.urdf").write_bytes(b"<robot>\xe9</robot>")
-    assert failure(folder / "latin.urdf") == f"{folder}/latin.urdf: byte 7 is not UTF-8 text; save the file as UTF-8"
+    (folder / "latin.urdf").write_bytes(b"<robot>\n\xe9</robot>")
+    problem = "byte 8 is not UTF-8 text; save the file as UTF-8"
+    assert failure(folder / "latin.urdf") == f"{folder}/latin.urdf, line 2: {problem}"
     (folder / "empty.xacro").touch()
     assert failure(folder / "empty.xacro").startswith(f"{folder}/empty.xacro, line 1: broken XML: the file is empty; ")
