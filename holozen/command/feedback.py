@@ -81,7 +81,7 @@ class CommandFeedback:
 
     def sent(self, command: Any) -> None:
         """Report any change after a command was sent. `command` is any object with its fields."""
-        if self._is_velocity and getattr(command, "twist", command).linear.y != 0:
+        if self._is_velocity and (getattr(command, "linear", None) or command.twist.linear).y != 0:
             self._strafes = True
         self.look()
 

@@ -117,6 +117,7 @@ HINTS = {
     "cv_bridge": "numpy.frombuffer(image.data, 'uint8').reshape(image.height, image.width, -1) is a colour image",
     "cv2": "pip install opencv-python-headless",
     "gazebo_msgs.srv": "simulation_interfaces.srv has SpawnEntity, DeleteEntity, GetEntityState and SetEntityState",
+    "gz": "this is Gazebo's own transport; use rclpy, or holozen.bus",
     "interactive_markers": "there are no interactive markers here; a topic or a service can set what a marker would",
     "launch_ros.actions.ComposableNodeContainer": COMPONENTS,
     "launch_ros.actions.LifecycleNode": "there are no lifecycle nodes here; use Node",

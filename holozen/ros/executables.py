@@ -65,7 +65,8 @@ def missing(path: Path, pattern: str, what: str) -> str:
     files = sorted(each.name for each in path.parent.glob(pattern) if each.is_file())
     if not files:
         return f"{path} does not exist, and there are no {what} in that folder"
-    return f"{path} does not exist{suggest(path.name, files) or f'; {what} in that folder: {listed(files, 20)}'}"
+    near = suggest(path.name, files, lambda name: name.partition(".")[0])
+    return f"{path} does not exist{near or f'; {what} in that folder: {listed(files, 20)}'}"
 
 
 def find(package: str, name: str, nameless: bool = False) -> Script:

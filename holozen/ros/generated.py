@@ -14,7 +14,7 @@ from array import array
 from collections.abc import Callable, Sequence, Set
 from copy import deepcopy
 from functools import partial
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import msgspec
 from msgspec import Meta, Struct, StructMeta
@@ -79,6 +79,12 @@ class RosMessage(Message, metaclass=RosMeta):
         if name not in self.__checks__:
             raise AttributeError(_no_field(type(self), name))
         _store(self, name, self.__checks__[name](value))
+
+    if not TYPE_CHECKING:  # a type checker would take any field as valid
+
+        def __getattr__(self, name: str) -> Any:
+            # An empty name keeps Python from adding a guess of its own.
+            raise AttributeError(_no_field(type(self), name), name="")
 
     def __repr__(self) -> str:
         values = []

@@ -79,6 +79,10 @@ def checked(entities: Any, place: str) -> list[LaunchDescriptionEntity]:
     return found
 
 
+OTHER_NAMES = {"pkg": "package", "type": "executable", "exec": "executable", "ns": "namespace", "args": "arguments"}
+"""A word of ROS's XML launch files -> the argument in Python."""
+
+
 def _unknown_argument(kind: type, word: str) -> str:
     names = {
         name
@@ -87,6 +91,6 @@ def _unknown_argument(kind: type, word: str) -> str:
         for name, parameter in inspect.signature(each).parameters.items()
         if parameter.kind is not parameter.VAR_KEYWORD
     }
-    if (new := word.removeprefix("node_")) != word and new in names:
-        return f"{kind.__name__} has no argument {word!r}, which is ROS's old name; write {new}=..."
+    if (new := OTHER_NAMES.get(word, word.removeprefix("node_"))) != word and new in names:
+        return f"{kind.__name__} has no argument {word!r}, which is its name in XML or an older ROS; write {new}=..."
     return f"{kind.__name__} has no argument {word!r}{suggest(word, names)}; arguments: {', '.join(sorted(names))}"

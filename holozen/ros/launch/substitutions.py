@@ -288,7 +288,10 @@ def _output(context: LaunchContext, command: str) -> str:
     if name == "cat" and len(words) == 2:
         return _with_origin(context, read_text(Path(words[1])), words[1:])
     if name not in ("xacro", "xacro.py"):
-        raise LaunchError(f"Command {command!r:.200}: only `xacro FILE name:=value ...` and `cat FILE` are run here")
+        joined = "; its parts are joined as they are: write 'xacro ', with the space"
+        hint = joined if command.startswith("xacro") else ""
+        problem = "only `xacro FILE name:=value ...` and `cat FILE` are run here"
+        raise LaunchError(f"Command {command!r:.200}: {problem}{hint}")
     words = [word for word in words[1:] if word not in _IGNORED]
     files = [word for word in words if ":=" not in word]
     if len(files) != 1 or files[0].startswith("-"):

@@ -80,6 +80,8 @@ def parse(args: Sequence[str] | None = None) -> Arguments:
 
     Raises RCLInvalidROSArgsError for a value that cannot be parsed, UnknownROSArgsError for an unknown flag.
     """
+    if isinstance(args, str):
+        raise TypeError(f"args={args!r} is one text; write a list of words: args={args.split()}")
     found = Arguments()
     words = iter(sys.argv if args is None else args)
     for text in words:

@@ -2,6 +2,7 @@
 
 import functools
 from enum import IntEnum
+from numbers import Real
 from typing import Any
 
 from holozen.ros.catalog import HelpfulAttributes
@@ -25,6 +26,8 @@ class ClockType(IntEnum):
 
 def _total(seconds: float, nanoseconds: float, what: str) -> int:
     """The sum in nanoseconds. Raises OverflowError for more than ROS can store."""
+    if not isinstance(seconds, Real):  # a text times 10**9 would be a longer text
+        raise TypeError(f"the seconds of a {what} must be a number; {seconds!r} is {article(type(seconds).__name__)}")
     total = int(seconds * S_TO_NS) + int(nanoseconds)
     if not -LARGEST <= total < LARGEST:
         raise OverflowError(f"{total} nanoseconds are too many for a {what}: it has 64 bits")

@@ -121,6 +121,8 @@ def test_an_unknown_flag_is_reported_with_the_nearest() -> None:
         parse("--ros-args", "goal.txt")
     with pytest.raises(TypeError, match="a list of str"):
         arguments.parse([5])  # type: ignore[list-item]
+    with pytest.raises(TypeError, match=r"^args='-p x:=1' is one text; write a list of words: args=\['-p', 'x:=1'\]$"):
+        arguments.parse("-p x:=1")
 
 
 WORDS = (

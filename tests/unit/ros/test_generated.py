@@ -95,6 +95,8 @@ def test_fields_are_given_by_their_names_only() -> None:
         TWIST(linaer=VECTOR())
     with pytest.raises(AttributeError, match=r"^geometry_msgs\.msg\.Vector3 has no field 'q'; it has x, y, z$"):
         TWIST().linear.q = 1.0
+    with pytest.raises(AttributeError, match=r"^nav_msgs\.msg\.Odometry has no field 'linear'; it has header, child_"):
+        generated.find("nav_msgs/msg/Odometry")().linear  # noqa: B018
     with pytest.raises(AttributeError, match="has no field 'x'; it has none"):
         generated.find("std_msgs/msg/Empty")().x = 1
 

@@ -280,6 +280,7 @@ def test_what_a_module_of_ros_lacks_is_reported(pretend: ModuleType) -> None:
     assert refused("import rclpy\nrclpy.__file__", AttributeError) == "rclpy has no '__file__'"
     assert "did you mean 'rclpy.pretend'?" in refused("import rclpy.pretens", ModuleNotFoundError)
     assert "this belongs to ROS 1; use ROS 2's rclpy" in refused("import rospy", ModuleNotFoundError)
+    assert "; use rclpy, or holozen.bus" in refused("import gz.transport13", ModuleNotFoundError)
     assert "numpy.frombuffer(image.data" in refused("from cv_bridge import CvBridge", ModuleNotFoundError)
 
 

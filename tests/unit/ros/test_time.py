@@ -75,6 +75,8 @@ def test_no_time_is_before_zero_or_beyond_64_bits() -> None:
     for too_long in computations:
         with pytest.raises(OverflowError, match="64 bits"):
             too_long()
+    with pytest.raises(TypeError, match="seconds of a duration must be a number; '1' is a str"):
+        Duration(seconds="1")  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="use a ClockType"):
         Time(clock_type=1)  # type: ignore[arg-type]
 

@@ -78,7 +78,7 @@ def generate_launch_description():
 
 def test_a_file_that_cannot_be_included_is_reported(follow: Follow, write: Write) -> None:
     for name, text, message in [
-        ("c.launch.py", "", r"b.launch.py does not exist \(did you mean 'c.launch.py'"),
+        ("c.launch.py", "", r"b.launch.py does not exist; launch files in that folder: c.launch.py"),
         ("b.launch.xml", "<launch/>", "launch files are in Python here; write b.launch.py, with a Node"),
         ("b.launch.txt", "", "not a launch file; the names of launch files end with .py"),
         ("b.launch.py", "x = 1", "has no function generate_launch_description"),

@@ -210,7 +210,11 @@ def test_what_cannot_be_followed_is_one_line(refuse: Launch, write: Write) -> No
         ),
         (
             described("Node(package='my_bot', node_executable='x')"),
-            "a.launch.py:8: Node has no argument 'node_executable', which is ROS's old name; write executable=...",
+            "a.launch.py:8: Node has no argument 'node_executable', which is its name in XML or an older ROS; write ",
+        ),
+        (
+            described("Node(pkg='my_bot', exec='x')"),
+            "a.launch.py:8: Node has no argument 'pkg', which is its name in XML or an older ROS; write package=...",
         ),
         (described("Node(package='my_bot')"), "a.launch.py:8: Node lacks executable='...'"),
         (

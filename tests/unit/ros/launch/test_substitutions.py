@@ -80,6 +80,10 @@ def test_what_gives_no_text_is_reported_with_its_place(context: LaunchContext) -
             s.Command(["rm -r ", "x"]),
             "Command 'rm -r x': only `xacro FILE name:=value ...` and `cat FILE` are run here",
         ),
+        (
+            s.Command(["xacro", "x"]),
+            "Command 'xacrox': .* are run here; its parts are joined as they are: write 'xacro '",
+        ),
         (s.Command("xacro"), "Command 'xacro': write `xacro FILE"),
         (s.Command("xacro nowhere.xacro"), "nowhere.xacro: No such file"),
         (s.Command("xacro 'a"), "No closing quotation"),
