@@ -55,7 +55,8 @@ class Connection(NamedTuple):
         """Where it looks for others, as text for people."""
         if self.config and self.connect is None:
             return f"the endpoints of {self.config}"
-        return ", ".join(self.connect_endpoints) or ", ".join(self._listen_endpoints())
+        domain = f" (domain {self.domain})" if self.connect is None and self.connect_endpoints else ""
+        return ", ".join(self.connect_endpoints or self._listen_endpoints()) + domain
 
     @property
     def networks(self) -> tuple[str, ...]:

@@ -169,6 +169,8 @@ def test_each_domain_has_meeting_points_of_its_own() -> None:
     ]  # fmt: skip
     assert sum(map(len, points)) == len(set[str]().union(*points))
     assert Connection(domain=0).meeting_points == RENDEZVOUS
+    assert Connection(domain=2).where.endswith(", tcp/127.0.0.1:7469 (domain 2)")
+    assert Connection(connect=("tcp/h:1",), domain=2).where == "tcp/h:1"
     assert value(Connection(domain=2), "listen/endpoints") == ["tcp/127.0.0.1:7467", LOOPBACK]
     assert value(Connection("client", domain=2), "connect/endpoints") == ["tcp/127.0.0.1:7467"]
 
