@@ -60,7 +60,7 @@ class YieldPolicy:
         if self.stopped:
             return f"yields: the robot is stopped by {self.stopped}; `holozen release` ends that, then {self._resume}"
         if self.yielded_to == EARLIER:
-            return f"another source drove this robot; {self._resume}"
+            return f"yields: another source drove this robot; {self._resume}"
         return f"yields to {self.yielded_to}; {self._resume}" if self.yielded_to else ""
 
     def stay(self, origin: str) -> None:

@@ -59,9 +59,13 @@ class Arguments(Struct):
         return found
 
     def unused(self, names: Collection[str], declared: Collection[str]) -> Iterator[str]:
-        """A line for each parameter that none of the nodes `names` declares, and each file that has none for them."""
+        """A line for each parameter that none of the nodes `names` declares, and each file that has none for them. Of
+        those in a file's section for one of them, only what looks like a declared one: others may be of ROS itself.
+        """
         mine = [section for section in self.sections if any(map(section.is_for, names))]
-        for name in sorted({name for section in mine if not section.file for name in section.values} - {*declared}):
+        given = {name for section in mine if not section.file for name in section.values}
+        own = {name for section in mine if section.place in names for name in section.values}
+        for name in sorted((given | {name for name in own if suggest(name, declared)}) - {*declared}):
             yield f"parameter {name!r} is given, but not declared{suggest(name, declared)}"
         for file in sorted({section.file for section in self.sections} - {section.file for section in mine} - {""}):
             places = listed(section.place for section in self.sections if section.file == file)

@@ -45,7 +45,7 @@ def test_it_yields_to_the_last_driver(policy: YieldPolicy) -> None:
 def test_a_robot_that_others_drove_before_it_came_is_not_taken(policy: YieldPolicy) -> None:
     policy.update(CommandStatus(held=True))
     assert policy.reason.startswith(
-        "another source drove this robot; resume with `holozen controller --resume` or press r"
+        "yields: another source drove this robot; resume with `holozen controller --resume` or press r"
     )
 
 

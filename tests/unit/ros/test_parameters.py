@@ -63,7 +63,9 @@ def test_one_that_is_given_and_that_no_node_declares_is_reported_once(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     ours, others = (tmp_path / name for name in ("ours.yaml", "others.yaml"))
-    ours.write_text("/lab/tom: {ros__parameters: {sped: 1.0}}\n/ann: {ros__parameters: {speed: 1.0}}")
+    ours.write_text(
+        "/lab/tom: {ros__parameters: {spede: 1.0, qos_overrides: true}}\n/ann: {ros__parameters: {speed: 1.0}}"
+    )
     others.write_text("tom: {ros__parameters: {speed: 1.0}}")
     files = ("--params-file", str(ours), "--params-file", str(others))
     node, other = Tom("-p", "sped:=0.5", "-p", "size:=9", *files), Tom()
@@ -74,6 +76,7 @@ def test_one_that_is_given_and_that_no_node_declares_is_reported_once(
     lines = capsys.readouterr().err.splitlines()
     assert [line.partition("]: ")[2] for line in lines] == [
         "parameter 'sped' is given, but not declared (did you mean 'speed'?)",
+        "parameter 'spede' is given, but not declared (did you mean 'speed'?)",
         f"{others} has no parameters for /lab/tom; it has some for /tom",
     ]
 
