@@ -385,6 +385,8 @@ def _advice(reason: str, lines: list[str]) -> str:
         return 'add xmlns:xacro="http://www.ros.org/wiki/xacro" to <robot>, or that of another prefix'
     if "junk after" in reason:
         return "a file has a single <robot> or <sdf> around everything: remove what follows its end"
+    if "unclosed token" in reason and "<!--" in "".join(lines[-1:]):
+        return "close the comment with -->"
     for line in reversed(lines):
         for pattern, advice in _CASES:
             if match := pattern.search(line):

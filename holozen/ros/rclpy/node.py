@@ -614,7 +614,9 @@ class Node(HelpfulAttributes):
 
 def _check_message(kind: Any) -> None:
     if not (isinstance(kind, type) and issubclass(kind, Message)):
-        raise AttributeError(f"{kind!r} is not a message type; import one: from geometry_msgs.msg import Twist")
+        import_one = "import one: from geometry_msgs.msg import Twist"
+        hint = f"write {type(kind).__name__}, without ()" if isinstance(kind, Message) else import_one
+        raise AttributeError(f"{kind!r:.80} is not a message type; {hint}")
 
 
 def _check_service(kind: Any) -> None:

@@ -151,6 +151,7 @@ def test_a_file_that_cannot_be_read_is_one_finding(findings: Findings) -> None:
             ('<robot name="r">\n<link name=\u201ca\u201d/></robot>', 2, "straight"),
             ('<robot name="r">\n<link\u00a0name="a"/></robot>', 2, "the no-break spaces"),
             ('{\\rtf1 <robot name="r"/>}', 1, "save the file as plain text"),
+            ('<robot name="r">\n<!--link name="a"/>\n</robot>', 2, "close the comment with -->"),
             ('<robot name="r">\n<!-- a -- b -->\n</robot>', 2, "a comment"),
             ('<robot name="r">\n<link name="a"type="b"/></robot>', 2, "a space"),
             ('\n<?xml version="1.0"?>\n<robot name="r"/>', 2, "before <?xml"),

@@ -34,7 +34,12 @@ def test_what_it_sends_has_priority_data_and_waits_only_to_keep_all(ros: Wire, k
 
 
 def test_another_type_is_reported(ros: Wire) -> None:
-    publisher = rclpy.create_node("tom").create_publisher(Twist, "cmd_vel", 1)
+    node = rclpy.create_node("tom")
+    with pytest.raises(
+        AttributeError, match=r"^geometry_msgs\.msg\.Twist\(.{,80} is not a message type; write Twist, wit"
+    ):
+        node.create_publisher(Twist(), "cmd_vel", 1)
+    publisher = node.create_publisher(Twist, "cmd_vel", 1)
     for wrong, message in (
         (3, "an int"),
         (Twist, "a Twist; write Twist()"),
