@@ -23,6 +23,7 @@ import pytest
 
 from holozen import cli
 from holozen.process import SIGNALS, Ending
+from holozen.ros import packages
 from holozen.testing.process import PATIENCE
 
 HERE = Path(__file__).parent
@@ -113,6 +114,8 @@ def call(capfd: pytest.CaptureFixture[str]) -> Generator[Callable[..., subproces
     yield run
     for number, handler in handlers.items():
         signal.signal(number, handler)
+    for known in (packages.given, packages.starts, packages.stand_ins):  # by `run` and `launch`
+        known.clear()
 
 
 @pytest.hookimpl(tryfirst=True)
