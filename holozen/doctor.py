@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 OK, WARNING, ERROR = "ok", "warning", "error"
 OPEN, FIND, LISTEN = 0.8, 0.6, 1.0  # s to reach a router, to find other nodes, and to listen to robots
-ANSWER = 0.4  # s for nodes to answer
+ANSWER = 1.0  # s for nodes to answer; a busy machine takes long
 ROUNDS = 3  # queries to each node; the fastest answer measures its clock best
 CLOCK_WARNING, CLOCK_ERROR = 0.05, 0.5  # s of offset; from 0.5 s on, stamps are refused (wire.MAX_STAMP_AGE)
 EXCLUSIVE = ("nav_msgs/msg/Odometry", "rosgraph_msgs/msg/Clock", "holozen/msg/CommandStatus")  # one publisher per key

@@ -16,8 +16,9 @@ Vector = tuple[float, float, float]
 SHORTEST = 1e-6  # length of a vector that gives a direction
 LARGEST = 1e6  # m, kg, kg m^2; larger numbers are mistakes, and 1e308 makes the engine compute NaN
 
-MAX_TEXT = 4_000_000  # characters, or bytes of a file; these three keep malicious files from stalling the reader
+MAX_TEXT = 4_000_000  # characters, or bytes of a file; these four keep malicious files from stalling the reader
 MAX_ELEMENTS = 50_000
+MAX_ATTRIBUTES = 1_000  # of one element
 DEEPEST = 200
 
 
@@ -319,6 +320,8 @@ class _Reader:
         self.count += 1
         if self.count > MAX_ELEMENTS:
             raise tag.wrong(f"is element number {self.count}; a file may have at most {MAX_ELEMENTS}")
+        if (given := len(attributes)) > MAX_ATTRIBUTES:
+            raise tag.wrong(f"has {given} attributes; an element may have at most {MAX_ATTRIBUTES}")
         if len(self.texts) > DEEPEST:
             raise tag.wrong(f"lies inside {DEEPEST} others; elements may be nested at most {DEEPEST} deep")
         self.open.children.append(tag)

@@ -43,11 +43,13 @@ def address(view: Process) -> str:
 
 
 @pytest.fixture(scope="module")
-def chromium() -> Iterator[Browser]:
+def chromium(request: pytest.FixtureRequest) -> Iterator[Browser]:
+    """A browser; one that draws in 3D, which takes it long, for a module with WEBGL = True."""
     path = shutil.which("chromium")
     assert path, "the mark `needs` has installed it"
+    flags = SOFTWARE_WEBGL if getattr(request.module, "WEBGL", False) else ()
     with sync_playwright() as playwright:
         # A container's root has no sandbox; only our own page is opened.
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox", *SOFTWARE_WEBGL])
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox", *flags])
         yield browser
         browser.close()

@@ -69,6 +69,7 @@ FEW_FRAMES = """
 GONE = "Tried to update non-existent component"
 """Viser's page reports it where a person uses what is being removed, such as a held button."""
 PHONE = {"width": 390, "height": 844}
+WEBGL = True
 
 
 @pytest.fixture(scope="module")

@@ -25,8 +25,9 @@ from holozen.bag.writer import BagWriter
 from holozen.bus import Bus
 from holozen.cli.spawn import Place, spawn_file
 from holozen.messages import Odometry
-from holozen.testing import Terminal, Wire, wait_for
-from holozen.testing.wire import command, free_port
+from holozen.testing import Terminal, Wire, process, wait_for
+from holozen.testing.process import START
+from holozen.testing.wire import free_port
 
 from .conftest import Verb, foreign_config, start_sim
 from .foreign_samples import PUTS
@@ -157,15 +158,8 @@ def tries(names: list[str], attempt: Callable[[str], T], at_once: int = SIDE_BY_
             yield name, outcome
 
 
-def run(words: list[str], stdout: Any = subprocess.PIPE) -> Done:
-    return subprocess.run(
-        [*command("")[:-1], *words],
-        stdin=subprocess.DEVNULL,
-        stdout=stdout,
-        stderr=subprocess.PIPE,
-        text=True,
-        timeout=120,
-    )
+def run(words: list[str], **options: Any) -> Done:
+    return process.run([*START, *words], within=120, **options)
 
 
 def flags(row: Row, wire: Wire) -> list[str]:
@@ -225,7 +219,7 @@ def test_ctrl_c_ends_what_waits(files: Files) -> None:
             mute.settimeout(30)
             there = ["--mode", "client", "--connect", f"tcp/127.0.0.1:{mute.getsockname()[1]}"]
             words = files.words(name, VERBS[name].live or "", "waiting")
-            with Terminal([*command("")[:-1], *words, *there]) as terminal, mute.accept()[0]:
+            with Terminal([*START, *words, *there]) as terminal, mute.accept()[0]:
                 terminal.type("\x03")
                 return terminal.process.wait(30), terminal.raw
 
@@ -237,7 +231,7 @@ def test_ctrl_c_ends_what_waits(files: Files) -> None:
 
 
 def test_it_does_its_work(busy: Wire, files: Files, call: Verb) -> None:
-    """As a process it does it as JSON, below."""
+    """As a process of its own it does it as JSON, below."""
 
     def attempt(name: str) -> Done:
         row = VERBS[name]
@@ -252,7 +246,7 @@ def test_it_does_its_work(busy: Wire, files: Files, call: Verb) -> None:
 def test_as_json_it_is_one_object_a_line(busy: Wire, files: Files) -> None:
     def attempt(name: str) -> Done:
         row = VERBS[name]
-        return run([*files.words(name, row.live or "", "json"), "--json", *flags(row, busy)])
+        return run([*files.words(name, row.live or "", "json"), "--json", *flags(row, busy)], is_new=True)
 
     for name, done in tries(LIVE, attempt):
         assert done.returncode in {VERBS[name].code, int(name == "doctor")}, f"{name}: {done.stderr}"
@@ -267,7 +261,7 @@ def test_a_reader_that_is_gone_ends_it_quietly(busy: Wire, files: Files) -> None
         os.close(reading)
         row = VERBS[name]
         with open(writing, "wb") as gone:
-            return run([*files.words(name, row.live or "", "pipe"), "--json", *flags(row, busy)], gone)
+            return run([*files.words(name, row.live or "", "pipe"), "--json", *flags(row, busy)], stdout=gone)
 
     for name, done in tries(OF_EACH_NOUN, attempt):
         assert done.returncode == 0, f"{name}: {done.stderr}"
@@ -302,7 +296,7 @@ def test_ctrl_c_ends_what_would_go_on(busy: Wire, files: Files) -> None:
         with Wire() as own:
             wire = own if row.live is None else busy
             begun, words = row.endless.begun, files.words(name, row.endless.words, "endless")
-            with Terminal([*command("")[:-1], *words, *flags(row, wire)]) as terminal:
+            with Terminal([*START, *words, *flags(row, wire)]) as terminal:
                 wait_for(lambda: re.search(begun, terminal.raw), 20, lambda: f"{begun} in {terminal.raw[-2000:]}")
                 terminal.type("\x03")
                 return terminal.process.wait(30), terminal.raw

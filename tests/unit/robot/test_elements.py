@@ -6,6 +6,7 @@ import pytest
 
 from holozen.robot.elements import (
     DEEPEST,
+    MAX_ATTRIBUTES,
     MAX_ELEMENTS,
     MAX_GUESSES,
     MAX_TEXT,
@@ -43,7 +44,12 @@ def test_too_much_text_is_refused_with_its_size_and_what_is_allowed() -> None:
     assert "broken XML" in refusal("x" * MAX_TEXT)
 
 
-def test_one_element_too_many_is_refused_before_the_rest_is_read() -> None:
+def test_one_element_or_attribute_too_many_is_refused_before_the_rest_is_read() -> None:
+    attributes = [f"a{number}=''" for number in range(MAX_ATTRIBUTES + 1)]
+    assert len(read_xml(f"<a {' '.join(attributes[1:])}/>", "f").attributes) == MAX_ATTRIBUTES
+    message = refusal(f"<a {' '.join(attributes)}> < broken")
+    given = MAX_ATTRIBUTES + 1
+    assert message == f"f, line 1: <a> has {given} attributes; an element may have at most {MAX_ATTRIBUTES}"
     most = "<b/>" * (MAX_ELEMENTS - 1)
     assert len(read_xml(f"<a>{most}</a>", "f").children) == MAX_ELEMENTS - 1
     message = refusal(f"<a>{most}\n<b/> < broken")
