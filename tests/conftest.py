@@ -32,6 +32,8 @@ PACKAGES = dict(line.split(" ", 1) for line in (HERE / "packages.txt").read_text
 
 IN_CI = os.environ.get("CI") == "true"
 QUICK = HERE / "unit"
+SLOW = {QUICK / "transport", QUICK / "test_benchmarks.py"}
+"""Of these, what takes as long as other tests."""
 SHARED = {"town", "fleet", "kiwi", "eye"}
 """Fixtures of a file whose processes run, and cost time, from the first test that uses them until the file's last."""
 REORDERED = {HERE / "faults", HERE / "integration", HERE / "terminals"}
@@ -60,7 +62,11 @@ def pytest_sessionfinish(exitstatus: int) -> None:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     paths = dict.fromkeys(item.path for item in items)
-    order = {path: (QUICK in path.parents, number) for number, path in enumerate(paths)}
+
+    def is_quick(path: Path) -> bool:
+        return QUICK in path.parents and SLOW.isdisjoint((path, path.parent))
+
+    order = {path: (is_quick(path), number) for number, path in enumerate(paths)}
 
     def place(item: pytest.Item) -> tuple[tuple[bool, int], bool]:
         """The long files first: none is left over at the end. In a file, the tests that share processes last."""
