@@ -15,6 +15,7 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
@@ -120,8 +121,11 @@ def call(capfd: pytest.CaptureFixture[str]) -> Generator[Callable[..., subproces
     yield run
     for number, handler in handlers.items():
         signal.signal(number, handler)
-    for known in (packages.given, packages.starts, packages.stand_ins):  # by `run` and `launch`
+    # What `run` and `launch` leave:
+    for known in (packages.given, packages.starts, packages.stand_ins):
         known.clear()
+    if importer := sys.modules.get("holozen.ros.importer"):
+        importer.remove()
 
 
 @pytest.hookimpl(tryfirst=True)
