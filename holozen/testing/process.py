@@ -99,7 +99,7 @@ class Forked:
 
 class Process:
     """A running program, the leader of its own session. `out` and `err` are its output so far. It gets a SIGTERM when
-    the thread that started it ends, so that a killed test leaves nothing behind.
+    the thread that started it ends, or if it is forked the test's process, so that a killed test leaves nothing behind.
 
     `stdin`, `stdout` and `stderr` are as for subprocess.Popen; by default the first is empty, the others are captured.
     With `terminal`, the first is a terminal, which becomes its controlling one: it delivers hang-ups and interrupts.
