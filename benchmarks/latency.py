@@ -1,14 +1,17 @@
 """Round trip of a command: cmd_vel (Twist) there, odom (Odometry) back, between two processes on loopback.
 
-Our bus, typed at both ends, against raw zenoh-python with the same bytes, the same settings and no types.
+Our bus, typed at both ends, against raw zenoh-python with the same bytes, the same settings and no types; and against
+the same with msgspec at both ends, which leaves what the bus adds: sender, number and time, the checks of a command.
 """
 
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
+import msgspec
 import zenoh
 
 from benchmarks.company import beside, guest, host, meeting_point, until
@@ -30,7 +33,7 @@ from holozen.messages import (
 from holozen.transport.connection import Connection
 from holozen.wire import MAX_COMMAND_BYTES
 
-AIM = "ratio <= 1.2 (ours / raw zenoh)"
+AIM = "ratio <= 1.2 (ours / raw zenoh, without types)"
 RATE = 50.0  # Hz, of the paced case
 DEPTH = 64  # samples that a reader keeps, on both sides
 
@@ -69,6 +72,16 @@ def answer_raw(endpoint: str) -> None:
             odom.put(ANSWER)
 
 
+def answer_typed(endpoint: str) -> None:
+    """A robot on raw zenoh, with msgspec."""
+    encode, decode = msgspec.json.Encoder().encode, msgspec.json.Decoder(Twist).decode
+    with open_raw(host(endpoint)) as session:
+        commands, odom = raw_ends(session, reads="cmd_vel", writes="odom")
+        while True:
+            assert decode(commands.recv().payload.to_bytes()) == COMMAND
+            odom.put(encode(ODOM))
+
+
 @contextmanager
 def ours(endpoint: str) -> Iterator[Trip]:
     """The pilot's side on our bus."""
@@ -97,6 +110,22 @@ def raw(endpoint: str) -> Iterator[Trip]:
 
         meet(lambda: commands.put(ASKED), odom.try_recv)
         assert trip() == ANSWER
+        yield trip
+
+
+@contextmanager
+def typed(endpoint: str) -> Iterator[Trip]:
+    """The pilot's side on raw zenoh, with msgspec."""
+    encode, decode = msgspec.json.Encoder().encode, msgspec.json.Decoder(Odometry).decode
+    with open_raw(guest(endpoint)) as session:
+        odom, commands = raw_ends(session, reads="odom", writes="cmd_vel")
+
+        def trip() -> object:
+            commands.put(encode(COMMAND))
+            return decode(odom.recv().payload.to_bytes())
+
+        meet(lambda: commands.put(ASKED), odom.try_recv)
+        assert trip() == ODOM
         yield trip
 
 
@@ -140,23 +169,29 @@ def timed(trip: Trip, count: int, period: float = 0.0) -> list[float]:
     return times
 
 
-def compare(name: str, sides: tuple[Trip, Trip], turns: int, count: int, period: float = 0.0) -> Case:
+def compare(name: str, aim: str, trips: dict[str, Trip], turns: int, count: int, period: float = 0.0) -> Case:
     """One case, `turns` rounds of `count` trips a side."""
-    ours, raw = sides
-    return Case(name, "us", AIM).take_turns(
-        turns, holozen=lambda: timed(ours, count, period), raw_zenoh=lambda: timed(raw, count, period)
-    )
+    rounds = {side: partial(timed, trip, count, period) for side, trip in trips.items()}
+    return Case(name, "us", aim).take_turns(turns, **rounds)
 
 
 def main() -> int:
     args = parser("latency", __doc__).parse_args()
-    here, there = meeting_point(), meeting_point()
+    a, b, c = meeting_point(), meeting_point(), meeting_point()
     turns, flat, paced = (2, 100, 5) if args.quick else (40, 500, 25)
-    with beside(answer_ours, here), beside(answer_raw, there), ours(here) as a, raw(there) as b:
-        compare("warm up", (a, b), turns=2, count=flat)
+    with (
+        beside(answer_ours, a), beside(answer_raw, b), beside(answer_typed, c),
+        ours(a) as bus, raw(b) as bare, typed(c) as bare_typed,
+    ):  # fmt: skip
+        untyped = {"holozen": bus, "raw_zenoh": bare}
+        with_msgspec = {"holozen": bus, "zenoh_and_msgspec": bare_typed}
+        for sides in (untyped, with_msgspec):
+            compare("warm up", "", sides, turns=2, count=flat)
         cases = [
-            compare("flat out", (a, b), turns, flat),
-            compare(f"paced at {RATE:g} Hz", (a, b), turns, paced, 1 / RATE),
+            compare("flat out", AIM, untyped, turns, flat),
+            compare("flat out", "", with_msgspec, turns, flat),
+            compare(f"paced at {RATE:g} Hz", AIM, untyped, turns, paced, 1 / RATE),
+            compare(f"paced at {RATE:g} Hz", "", with_msgspec, turns, paced, 1 / RATE),
         ]
     publish("latency", cases, args.json)
     return 0
