@@ -1,6 +1,5 @@
 """Rotation matrices and inertia tensors as numpy arrays, in radians; quaternions are those of `holozen.rotation`."""
 
-import math
 from collections.abc import Sequence
 from itertools import permutations
 from typing import Any
@@ -8,10 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from holozen.rotation import XYZW
+from holozen.rotation import XYZ, XYZW, to_rpy
 
 Array = npt.NDArray[np.float64]
-UPRIGHT = 1e-8  # cosine of a pitch that counts as straight up or down
 
 
 def matrix_of(rpy: Sequence[float]) -> Array:
@@ -27,16 +25,9 @@ def matrix_of(rpy: Sequence[float]) -> Array:
     )
 
 
-def rpy_of(matrix: Array) -> tuple[float, float, float]:
-    """Roll, pitch and yaw of a rotation matrix, the inverse of `matrix_of`; roll is 0 where x points straight up or
-    down, since roll and yaw turn the same way there.
-    """
-    (a, b, _), (d, e, _), (g, h, i) = matrix.tolist()
-    level = math.hypot(a, d)
-    pitch = math.atan2(0.0 - g, level)  # 0.0 - 0.0 has no sign
-    if level < UPRIGHT:
-        return 0.0, pitch, math.atan2(0.0 - b, e)
-    return math.atan2(h, i), pitch, math.atan2(d, a)
+def rpy_of(matrix: Array) -> XYZ:
+    """Roll, pitch and yaw of a rotation matrix, the inverse of `matrix_of`, as by `to_rpy`."""
+    return to_rpy(quaternion_of(matrix))
 
 
 def quaternion_of(matrix: Array) -> XYZW:
@@ -79,7 +70,7 @@ def symmetric(values: Sequence[float]) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def triple(values: Any) -> tuple[float, float, float]:
+def triple(values: Any) -> XYZ:
     """Three values as plain floats, as engines require them."""
     x, y, z = (float(value) for value in values)
     return x, y, z
