@@ -7,8 +7,7 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import closing
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -31,7 +30,6 @@ from holozen.messages import (
 )
 from holozen.messages import simulation_interfaces as si
 from holozen.robot.loading import parse
-from holozen.robot.model import WorldSpec
 from holozen.robot.xacro import expand_xacro
 from holozen.testing import Wire, wait_for
 from holozen.transport.errors import ServiceError
@@ -99,14 +97,8 @@ def at(x: float, y: float, z: float, frame: str = "", q: Quaternion | None = Non
 
 
 @pytest.fixture
-def world() -> Iterator[World]:
-    with closing(World(WorldSpec(ground=True))) as world:
-        yield world
-
-
-@pytest.fixture
-def town(wire: Wire, world: World) -> Town:
-    return Town(wire, world)
+def town(wire: Wire, ground: World) -> Town:
+    return Town(wire, ground)
 
 
 def test_a_robot_is_put_where_the_request_places_it_and_has_keys_by_its_name(town: Town) -> None:
@@ -280,14 +272,8 @@ def test_what_touches_another_or_the_ground_has_room(town: Town) -> None:
     town.spawn("sunk", BALL, x=5, z=0.1)
 
 
-@pytest.fixture(params=["pybullet", "mujoco"])
-def level(wire: Wire, request: pytest.FixtureRequest) -> Iterator[Town]:
-    """A world with a level ground, in each engine."""
-    with closing(World(WorldSpec(ground=True), request.param)) as world:
-        yield Town(wire, world)
-
-
-def test_nothing_is_put_deep_into_the_ground(level: Town) -> None:
+@pytest.mark.engines
+def test_nothing_is_put_deep_into_the_ground(town: Town) -> None:
     """The engine throws what is 1 m deep 17 m up."""
     told = "there is no room for '{}' at x 20 y 0 z {}: it would be {} m below the ground; the lowest free z is {}"
     for name, text, z, depth, least in (
@@ -296,36 +282,37 @@ def test_nothing_is_put_deep_into_the_ground(level: Town) -> None:
         ("crate", BOX, -0.2, 0.7, 0.5),
         ("ball", BALL, -0.1, 0.3, 0.2),
     ):
-        found = level.refusal(partial(level.spawn, name, text, z=z, x=20))
+        found = town.refusal(partial(town.spawn, name, text, z=z, x=20))
         assert found == (si.SpawnEntityReply.INVALID_POSE, told.format(name, f"{z:.10g}", depth, least))
-        level.spawn(name, text, z=least, x=20)
-        level.services.delete(si.DeleteEntityRequest(name))
+        town.spawn(name, text, z=least, x=20)
+        town.services.delete(si.DeleteEntityRequest(name))
 
 
-def test_a_root_frame_on_the_ground_and_shallow_contact_have_room(level: Town) -> None:
-    level.spawn("Fred", z=-0.08)
-    level.spawn("crate", BOX, x=5)
-    level.spawn("wall", BOX.replace("<link", "<static>true</static><link"), x=-5, z=-0.3)
+@pytest.mark.engines
+def test_a_root_frame_on_the_ground_and_shallow_contact_have_room(town: Town) -> None:
+    town.spawn("Fred", z=-0.08)
+    town.spawn("crate", BOX, x=5)
+    town.spawn("wall", BOX.replace("<link", "<static>true</static><link"), x=-5, z=-0.3)
 
 
-def test_an_entity_is_not_moved_into_the_ground(level: Town) -> None:
-    fred = level.spawn("Fred", z=-0.04)
-    level.loop.run(steps(), 120)
+@pytest.mark.engines
+def test_an_entity_is_not_moved_into_the_ground(town: Town) -> None:
+    fred = town.spawn("Fred", z=-0.04)
+    town.loop.run(steps(), 120)
     before = fred.body.pose()
 
     def move(z: float, q: Quaternion | None = None) -> object:
-        return level.services.put(si.SetEntityStateRequest("Fred", si.EntityState(pose=at(1, 0, z, q=q).pose)))
+        return town.services.put(si.SetEntityStateRequest("Fred", si.EntityState(pose=at(1, 0, z, q=q).pose)))
 
-    code, told = level.refusal(lambda: move(-1))
+    code, told = town.refusal(lambda: move(-1))
     assert code == si.Result.OPERATION_FAILED and told.endswith("0.96 m below the ground; the lowest free z is -0.04")
     assert fred.body.pose()[0] == pytest.approx(before[0], abs=1e-6)
-    assert "below the ground" in level.refusal(lambda: move(-0.1, Quaternion(1, 0, 0, 0)))[1]
+    assert "below the ground" in town.refusal(lambda: move(-0.1, Quaternion(1, 0, 0, 0)))[1]
     move(before[0][2])
 
 
-def test_without_a_ground_every_height_has_room(wire: Wire) -> None:
-    with closing(World(WorldSpec(ground=False))) as world:
-        Town(wire, world).spawn("Fred", z=-3)
+def test_without_a_ground_every_height_has_room(wire: Wire, air: World) -> None:
+    Town(wire, air).spawn("Fred", z=-3)
 
 
 def test_an_entity_is_not_moved_into_another(town: Town) -> None:
@@ -640,12 +627,12 @@ def test_a_robots_file_puts_nothing_on_a_key_that_is_taken(town: Town, tag: str)
 
 @pytest.mark.parametrize("robots", [(), ("Fred", "Ann")])
 def test_what_fails_in_the_engine_is_taken_out_and_no_other(
-    town: Town, world: World, robots: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+    town: Town, ground: World, robots: tuple[str, ...], capsys: pytest.CaptureFixture[str]
 ) -> None:
     for place, name in enumerate(robots):
         town.spawn(name, x=5.0 * place, entity_namespace=name)
     ball = town.spawn("ball", BALL, z=0.2, x=-5)
-    world.engine.move(ball.body.number, (math.nan, 0.0, 0.0), (0.0, 0.0, 0.0))
+    ground.engine.move(ball.body.number, (math.nan, 0.0, 0.0), (0.0, 0.0, 0.0))
     town.loop.run(steps(), 24)
     assert [entity.name for entity in town.entities] == list(robots)
     assert "sim: ball was removed from the world: its pose or velocity is not finite" in capsys.readouterr().err

@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -31,7 +31,7 @@ from holozen.messages import (
 )  # fmt: skip
 from holozen.messages.codec import encode
 from holozen.robot.loading import load
-from holozen.robot.model import Drive, WorldSpec
+from holozen.robot.model import Drive
 from holozen.testing import Wire, wait_for
 from holozen.transport.errors import ServiceError
 from holozen.transport.pubsub import Publisher, Subscription
@@ -79,14 +79,8 @@ class Sim:
 
 
 @pytest.fixture
-def world() -> Iterator[World]:
-    with closing(World(WorldSpec(ground=True))) as world:
-        yield world
-
-
-@pytest.fixture
-def sim(wire: Wire, world: World) -> Sim:
-    return Sim(wire, world)
+def sim(wire: Wire, ground: World) -> Sim:
+    return Sim(wire, ground)
 
 
 def test_a_run_ends_after_its_steps_or_when_it_is_stopped(sim: Sim) -> None:
@@ -139,8 +133,8 @@ def test_transforms_and_clock_are_published(sim: Sim) -> None:
     assert ticks[-1].clock.seconds() == pytest.approx(1.0)
 
 
-def test_odom_and_its_transform_can_be_switched_off(wire: Wire, world: World) -> None:
-    sim = Sim(wire, world, drive=Drive(publish_odom=False, publish_odom_tf=False))
+def test_odom_and_its_transform_can_be_switched_off(wire: Wire, ground: World) -> None:
+    sim = Sim(wire, ground, drive=Drive(publish_odom=False, publish_odom_tf=False))
     odom = sim.bus.subscribe("Fred/odom", Odometry, depth=1000)
     tf = sim.bus.subscribe("Fred/tf", TFMessage, depth=1000)
     sim.run(240)
@@ -149,8 +143,8 @@ def test_odom_and_its_transform_can_be_switched_off(wire: Wire, world: World) ->
     assert "Fred/odom" not in frames
 
 
-def test_a_command_from_another_process_drives_and_its_silence_stops(wire: Wire, world: World) -> None:
-    sim = Sim(wire, world, rtf=1.0)
+def test_a_command_from_another_process_drives_and_its_silence_stops(wire: Wire, ground: World) -> None:
+    sim = Sim(wire, ground, rtf=1.0)
     me = wire.bus("me")
     odom = me.latest("Fred/odom", Odometry)
     commands: Publisher[Twist] = me.publisher("Fred/cmd_vel", Twist)
@@ -173,8 +167,8 @@ def test_a_command_from_another_process_drives_and_its_silence_stops(wire: Wire,
     assert 0.1 < sim.robot.mover.body.pose()[0][0] < 0.5 + spent  # half a second from its sending, and late steps
 
 
-def test_what_is_wrong_never_reaches_the_engine_and_is_counted(wire: Wire, world: World) -> None:
-    sim, me = Sim(wire, world, rtf=1.0), wire.bus("me")
+def test_what_is_wrong_never_reaches_the_engine_and_is_counted(wire: Wire, ground: World) -> None:
+    sim, me = Sim(wire, ground, rtf=1.0), wire.bus("me")
     status = me.latest("Fred/cmd_vel_status", CommandStatus)
     commands: Publisher[Twist] = me.publisher("Fred/cmd_vel", Twist)
     bad = {
@@ -198,8 +192,8 @@ def test_what_is_wrong_never_reaches_the_engine_and_is_counted(wire: Wire, world
     assert sim.robot.mover.body.pose()[0][:2] == pytest.approx((0, 0), abs=1e-4)
 
 
-def test_the_priority_is_read_off_the_sample(wire: Wire, world: World) -> None:
-    sim, me = Sim(wire, world, rtf=1.0), wire.bus("me")
+def test_the_priority_is_read_off_the_sample(wire: Wire, ground: World) -> None:
+    sim, me = Sim(wire, ground, rtf=1.0), wire.bus("me")
     status = me.latest("Fred/cmd_vel_status", CommandStatus)
     commands: Publisher[Twist] = me.publisher("Fred/cmd_vel", Twist, PRIORITY_OF["controller"])
     with sim.running():
@@ -214,8 +208,8 @@ def test_the_priority_is_read_off_the_sample(wire: Wire, world: World) -> None:
     assert (reported.obeyed, reported.priority, reported.held) == (me.source, "DATA_LOW", False)
 
 
-def test_resume_is_a_service_between_the_steps(wire: Wire, world: World) -> None:
-    sim, me = Sim(wire, world, rtf=1.0), wire.bus("me")
+def test_resume_is_a_service_between_the_steps(wire: Wire, ground: World) -> None:
+    sim, me = Sim(wire, ground, rtf=1.0), wire.bus("me")
     with sim.running():
         assert me.call("Fred/resume", TriggerRequest(), TriggerReply).success
         sim.arbiter.timeout = -1
@@ -225,8 +219,8 @@ def test_resume_is_a_service_between_the_steps(wire: Wire, world: World) -> None
     assert sim.arbiter.resumed == 1
 
 
-def test_stop_and_release_are_services_and_published_at_once(wire: Wire, world: World) -> None:
-    sim, me = Sim(wire, world, rtf=1.0), wire.bus("me")
+def test_stop_and_release_are_services_and_published_at_once(wire: Wire, ground: World) -> None:
+    sim, me = Sim(wire, ground, rtf=1.0), wire.bus("me")
     status = me.subscribe("Fred/cmd_vel_status", CommandStatus)
     with sim.running():
         for verb, setter in (("stop", me.source), ("stop", me.source), ("release", ""), ("release", "")):
@@ -402,9 +396,9 @@ def test_a_paused_sim_reads_the_request_after_another_at_once_and_rests_when_non
 
 
 def test_a_stall_is_an_overrun_in_the_status(
-    clock: list[float], wire: Wire, world: World, capsys: pytest.CaptureFixture[str]
+    clock: list[float], wire: Wire, ground: World, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    sim = Sim(wire, world, rtf=1.0)
+    sim = Sim(wire, ground, rtf=1.0)
     status = sim.bus.subscribe("simulation_status", SimulationStatus)
 
     def reported() -> SimulationStatus | None:
@@ -413,8 +407,8 @@ def test_a_stall_is_an_overrun_in_the_status(
         return new[-1] if new and new[-1] and new[-1].overruns else None
 
     with sim.running():
-        wait_for(lambda: world.steps)
-        before = world.steps
+        wait_for(lambda: ground.steps)
+        before = ground.steps
         clock[0] += 1.0
         newest = wait_for(reported)
     assert newest
