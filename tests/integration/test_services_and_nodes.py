@@ -1,13 +1,10 @@
 """`holozen service`, `node` and `router`, and the command line as a whole."""
 
 import json
-import os
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator
 from importlib.metadata import version
-from pathlib import Path
 
 import pytest
 
@@ -18,9 +15,6 @@ from holozen.wire import SERVICES
 from .conftest import Verb, start_sim
 from .processes import assert_one_line
 from .robots import Robot, place
-
-ROOT = Path(__file__).parents[2]
-VERBS = ["up", "sim", "teleop", "controller", "pose-service", "router", "xacro", "topic", "service", "node"]
 
 
 @pytest.fixture(scope="module")
@@ -169,35 +163,8 @@ def test_a_router_whose_port_is_taken_reports_it(town: Wire) -> None:
     assert_one_line(done, 1, "holozen router: cannot open Zenoh: ", str(town.port))
 
 
-def test_an_unknown_verb_is_one_line(verb: Verb, town: Wire) -> None:
-    assert_one_line(verb(town, "drive"), 2, "holozen: no verb 'drive'; `holozen --help` lists the verbs")
-
-
-def test_help_names_every_verb() -> None:
-    shown = subprocess.run(command("--help"), capture_output=True, text=True)
-    assert shown.returncode == 0
-    for verb in VERBS:
-        assert f"\n  {verb} " in shown.stdout
-
-
-def test_without_a_verb_it_shows_the_help_and_fails() -> None:
-    done = subprocess.run([sys.executable, "-m", "holozen"], capture_output=True, text=True)
-    assert done.returncode == 2
-    assert "usage: holozen VERB" in done.stdout + done.stderr
-
-
 def test_the_version_is_that_of_the_package() -> None:
     assert subprocess.run(command("--version"), capture_output=True, text=True).stdout == f"{version('holozen')}\n"
-
-
-@pytest.mark.parametrize(("verb", "unbuffered"), [("--help", ""), ("xacro urdf/hb_bot.urdf.xacro", "1")])
-def test_output_into_a_reader_that_is_gone_ends_quietly(verb: str, unbuffered: str) -> None:
-    read, write = os.pipe()
-    os.close(read)
-    env = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
-    with os.fdopen(write, "wb") as gone:
-        done = subprocess.run(command(*verb.split()), stdout=gone, stderr=subprocess.PIPE, text=True, cwd=ROOT, env=env)
-    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_service_type_find_and_info(verb: Verb, town: Wire) -> None:

@@ -158,16 +158,19 @@ def test_so_is_one_that_comes_while_a_class_is_made(monkeypatch: pytest.MonkeyPa
         cli.main(["node", "list"])
 
 
-@pytest.mark.parametrize("links", [1, 1000])  # less and more than one buffer
-def test_a_reader_that_has_seen_enough_is_no_failure(links: int, tmp_path: Path) -> None:
-    path = tmp_path / "robot.xacro"
-    path.write_text(f"<robot name='r'>{'<link/>' * links}</robot>")
+@pytest.mark.parametrize(
+    ("words", "unbuffered"),
+    [("--help", ""), ("xacro {}/short.xacro", ""), ("xacro {}/long.xacro", ""), ("xacro {}/long.xacro", "1")],
+)
+def test_a_reader_that_has_seen_enough_is_no_failure(words: str, unbuffered: str, tmp_path: Path) -> None:
+    for name, links in (("short", 1), ("long", 1000)):  # less and more than one buffer
+        (tmp_path / f"{name}.xacro").write_text(f"<robot name='r'>{'<link/>' * links}</robot>")
     reading, writing = os.pipe()
     os.close(reading)
-    words = [sys.executable, "-m", "holozen", "xacro", str(path)]
+    line = [sys.executable, "-m", "holozen", *words.format(tmp_path).split()]
     with open(writing, "wb") as pipe:
-        env = {**os.environ, "PYTHONUNBUFFERED": ""}
-        done = subprocess.run(words, stdout=pipe, stderr=subprocess.PIPE, timeout=60, env=env)
+        env = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+        done = subprocess.run(line, env=env, stdout=pipe, stderr=subprocess.PIPE, timeout=60)
     assert (done.returncode, done.stderr) == (0, b"")
 
 
