@@ -131,14 +131,6 @@ def test_a_stop_is_repeated_until_the_robot_rests_and_then_the_teleop_is_silent(
         wait_for(silent, what="half a second without a command")
 
 
-def test_an_idle_teleop_publishes_nothing(town: Wire, robot: Robot) -> None:
-    commands = robot.commands.from_now()
-    with start_teleop(town) as terminal:
-        type_until(lambda: "speed     0.500 m/s" not in terminal.screen(), terminal, "qz")
-    robot.newest()
-    assert commands.messages() == []
-
-
 def test_a_repeat_rate_of_zero_sends_a_command_once(town: Wire, robot: Robot) -> None:
     with start_teleop(town, "--repeat-rate", "0", "--mode", "latch") as terminal:
         commands = robot.commands.from_now()

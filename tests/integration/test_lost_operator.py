@@ -63,13 +63,7 @@ def driver(wire: Wire, robot: Robot, dead_man: bool = True) -> Process:
     return process
 
 
-def test_a_driver_that_is_killed_leaves_a_robot_that_stands(town: Wire, robot: Robot) -> None:
-    with driver(town, robot) as process:
-        process.kill()
-        robot.stands()
-
-
-def test_one_that_comes_back_is_obeyed_as_usual(town: Wire, robot: Robot) -> None:
+def test_a_driver_that_is_killed_leaves_a_robot_that_stands_and_obeys_the_next_one(town: Wire, robot: Robot) -> None:
     for _ in range(2):
         with driver(town, robot) as process:
             process.kill()

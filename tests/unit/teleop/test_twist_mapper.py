@@ -71,11 +71,13 @@ def test_any_other_key_stops_the_robot() -> None:
 
 
 def test_a_key_drives_again_at_once_after_a_stop_key() -> None:
-    mapper = TwistMapper(HELD, TTK)
-    typed(mapper, "i", 1.0)
-    typed(mapper, "k", 1.2)
-    typed(mapper, "i", 1.5)
-    assert commanded(mapper, 1.5) == Twist.planar(0.5)
+    for settings in (SETTINGS, HELD):
+        mapper = TwistMapper(settings, TTK)
+        typed(mapper, "i", 1.0)
+        typed(mapper, "k", 1.2)
+        assert mapper.motion == STILL
+        typed(mapper, "i", 1.5)
+        assert commanded(mapper, 1.5) == Twist.planar(0.5)
 
 
 def test_any_other_key_stops_a_robot_that_another_source_drives(mapper: TwistMapper) -> None:
@@ -323,11 +325,3 @@ def test_some_keys_ask_for_more_than_motion() -> None:
         mapper = TwistMapper(SETTINGS, TTK)
         assert typed(mapper, key, 1.0) == action
         assert up(mapper, key) == ""
-
-
-def test_a_key_that_is_typed_again_after_the_stop_key_drives_again(mapper: TwistMapper) -> None:
-    typed(mapper, "i", 1.0)
-    typed(mapper, "k", 1.2)
-    assert mapper.motion == STILL
-    typed(mapper, "i", 1.4)
-    assert mapper.motion != STILL
