@@ -1,7 +1,6 @@
 """What a script sends to the sim."""
 
 import math
-from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
@@ -19,14 +18,6 @@ from tests.integration.robots import Robot, moves, rests
 
 Twist: Any = find("geometry_msgs/msg/Twist")
 Vector3: Any = find("geometry_msgs/msg/Vector3")
-
-
-@pytest.fixture
-def context(wire: Wire) -> Iterator[Context]:
-    context = Context()
-    context.init(args=[])
-    yield context
-    context.try_shutdown()
 
 
 def _counts(refused: int, status: CommandStatus) -> bool:

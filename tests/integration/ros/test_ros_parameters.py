@@ -11,7 +11,6 @@ from holozen.cli import main
 from holozen.messages import rcl_interfaces as r
 from holozen.messages.codec import WIRES
 from holozen.ros.generated import find
-from holozen.ros.rclpy import context as contexts
 from holozen.ros.rclpy.context import Context
 from holozen.ros.rclpy.executors import SingleThreadedExecutor
 from holozen.ros.rclpy.node import Node
@@ -44,15 +43,6 @@ class Robot(Node):
 
     def values(self, *names: str) -> list[Any]:
         return [each.value for each in self.get_parameters(names)]
-
-
-@pytest.fixture
-def context(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> Iterator[Context]:
-    monkeypatch.setattr(contexts, "connection", wire.connection)
-    context = Context()
-    context.init(args=[])
-    yield context
-    context.try_shutdown()
 
 
 @pytest.fixture

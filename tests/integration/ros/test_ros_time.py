@@ -1,7 +1,6 @@
 """Time of a script's node: the sim's, where `use_sim_time` is true, for its timers, rates and sleeps."""
 
 import threading
-from collections.abc import Iterator
 
 import pytest
 
@@ -17,15 +16,6 @@ from holozen.ros.rclpy.time import ClockType, Duration, Time
 from holozen.testing import Wire, wait_for
 
 SIMULATED = ["--ros-args", "-p", "use_sim_time:=true"]
-
-
-@pytest.fixture
-def context(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> Iterator[Context]:
-    monkeypatch.setattr(contexts, "connection", wire.connection)
-    context = Context()
-    context.init(args=[])
-    yield context
-    context.try_shutdown()
 
 
 class Hand:
