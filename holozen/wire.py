@@ -18,9 +18,12 @@ SIM_SILENCE = 1.0  # s; an older status of a sim is stale
 MAX_ENTITIES = 1000  # of one sim; each takes time at every step
 MAX_COMMAND_BYTES = 65_536  # a Twist takes about 100; a larger command is not decoded
 MAX_STAMP_AGE = 0.5  # s; an older (or as far future) stamp on a command is refused
-MAX_SPEED, MAX_TURN = 100.0, 1000.0  # m/s, rad/s; a command beyond them is a mistake: it is refused, not clamped
-MAX_FORCE = 1e4  # N, N m; likewise
-MAX_OF_JOINT = {"position": 1e4, "velocity": 1e3, "effort": 1e6}  # rad or m; rad/s or m/s; N m or N; likewise
+# A command beyond these is a mistake: it is refused, not clamped.
+MAX_OF = {
+    "Twist": (("linear", 100.0, "m/s"), ("angular", 1000.0, "rad/s")),
+    "Wrench": (("force", 1e4, "N"), ("torque", 1e4, "N m")),
+}
+MAX_OF_JOINT = {"position": 1e4, "velocity": 1e3, "effort": 1e6}  # rad or m; rad/s or m/s; N m or N
 
 # The services after which a robot may move: no late call ends a stop from after it, or sends off a robot.
 FREEING = ("release", "resume", "send_goal")
@@ -228,23 +231,17 @@ def implausible(command: Any, type_name: str) -> str:
     `command` is a message of that type, or any object with its fields.
     """
     name = type_name.rpartition("/")[2]
-    if name == "Wrench":
-        for part, unit in (("force", "N"), ("torque", "N m")):
-            for axis in "xyz":
-                if abs(value := getattr(getattr(command, part), axis)) > MAX_FORCE:
-                    return f"{part}.{axis} is {value:g} {unit}; at most {MAX_FORCE:g}"
-    if name == "JointState":
-        for kind, most in MAX_OF_JOINT.items():
-            for index, value in enumerate(getattr(command, kind)):
-                if abs(value) > most:
-                    joint = f" of joint {command.name[index][:80]!r}" if index < len(command.name) else ""
-                    return f"{kind}[{index}]{joint} is {value:g}; at most {most:g}"
-    if name in ("Twist", "TwistStamped"):
-        twist = command.twist if name == "TwistStamped" else command
-        for part, most, unit in (("linear", MAX_SPEED, "m/s"), ("angular", MAX_TURN, "rad/s")):
-            for axis in "xyz":
-                if abs(value := getattr(getattr(twist, part), axis)) > most:
-                    return f"{part}.{axis} is {value:g} {unit}; at most {most:g}"
+    if name == "TwistStamped":
+        name, command = "Twist", command.twist
+    for part, most, unit in MAX_OF.get(name, ()):
+        for axis in "xyz":
+            if abs(value := getattr(getattr(command, part), axis)) > most:
+                return f"{part}.{axis} is {value:g} {unit}; at most {most:g}"
+    for kind, most in MAX_OF_JOINT.items() if name == "JointState" else ():
+        for index, value in enumerate(getattr(command, kind)):
+            if abs(value) > most:
+                joint = f" of joint {command.name[index][:80]!r}" if index < len(command.name) else ""
+                return f"{kind}[{index}]{joint} is {value:g}; at most {most:g}"
     return ""
 
 
