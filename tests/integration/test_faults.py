@@ -16,6 +16,8 @@ from holozen.testing import Wire, wait_for
 from holozen.transport.errors import ServiceError
 from holozen.transport.pubsub import Latest
 
+from .processes import assert_one_line
+
 LIMIT = 60.0  # s for `holozen spawn` on a busy machine
 INERTIAL = '<inertial><mass value="{}"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
 BALL = '<collision><geometry><sphere radius="{}"/></geometry></collision>'
@@ -98,9 +100,7 @@ def test_an_impossible_robot_is_one_error_line(town: Wire, bus: Bus, tmp_path: P
     file = tmp_path / ("r.urdf.xacro" if "xmlns:xacro" in text else "r.urdf")
     file.write_text(text.replace(MANY, 100_000_000 * "x"))
     ended = town.run("spawn", str(file), "--name", "Fred", within=LIMIT)
-    assert (ended.returncode, ended.stdout) == (1, "")
-    assert ended.stderr.count("\n") == 1
-    assert str(file) in ended.stderr and reported in ended.stderr
+    assert_one_line(ended, 1, str(file), reported)
 
 
 def triangles(count: int, bad: float = 0.0) -> bytes:

@@ -125,11 +125,7 @@ def test_a_sim_that_cannot_start_gives_the_reason_in_one_line(
     (tmp_path / "still.urdf").write_text(NO_DRIVE)
     names = {"tmp": tmp_path, "bot": BOT, "picture": data.find("meshes", "logo.png")}
     done = verb(wire, "sim", *(word.format(**names) for word in words))
-    assert done.returncode == code
-    assert done.stdout == ""
-    lines = done.stderr.splitlines()
-    assert len(lines) == 1, done.stderr
-    assert reason.format(**names) in lines[0]
+    assert_one_line(done, code, reason.format(**names))
 
 
 def test_a_second_sim_only_joins_with_named_robots_and_then_both_are_one_world_to_callers(

@@ -14,6 +14,7 @@ from holozen.testing import Wire, wait_for
 from holozen.transport.errors import ServiceError
 
 from .conftest import Verb, foreign_config, start_sim
+from .processes import assert_one_line
 from .robots import Robot, place, time_of
 
 HALF = math.sqrt(3) / 2
@@ -122,10 +123,7 @@ def test_a_file_of_goals_that_is_wrong_is_named_with_its_line(
     verb: Verb, town: Wire, tmp_path: Path, content: bytes, reason: str
 ) -> None:
     (tmp_path / "goals.txt").write_bytes(content)
-    done = verb(town, "pose-service", "--goals", str(tmp_path / "goals.txt"))
-    assert done.returncode == 1
-    assert done.stderr.count("\n") == 1
-    assert reason in done.stderr
+    assert_one_line(verb(town, "pose-service", "--goals", str(tmp_path / "goals.txt")), 1, reason)
 
 
 @pytest.mark.parametrize(
@@ -136,10 +134,7 @@ def test_a_file_of_goals_that_is_wrong_is_named_with_its_line(
     ],
 )
 def test_a_wrong_flag_is_one_error_line(verb: Verb, town: Wire, words: list[str], code: int, reason: str) -> None:
-    done = verb(town, "pose-service", *words)
-    assert done.returncode == code
-    assert reason in done.stderr.splitlines()[-1]
-    assert "Traceback" not in done.stderr
+    assert_one_line(verb(town, "pose-service", *words), code, reason)
 
 
 def test_get_pose_returns_the_last_odom_until_it_is_stale(wire: Wire) -> None:

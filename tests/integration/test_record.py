@@ -19,7 +19,7 @@ from holozen.testing.wire import command
 
 from .conftest import Verb
 from .foreign_samples import PAYLOADS
-from .processes import read
+from .processes import assert_one_line, read
 from .robots import Robot
 
 BLOCK = zenoh.CongestionControl.BLOCK  # by default a burst loses some, before anybody receives it
@@ -203,10 +203,7 @@ def test_an_error_is_reported_in_one_line(
         (("a//b", "-o", "a"), 1, "key 'a//b'"),
     ]:
         monkeypatch.chdir(tmp_path)
-        done = verb(wire, "record", *words)
-        assert done.returncode == code, done.stderr
-        assert part in done.stderr.splitlines()[-1]
-        assert "Traceback" not in done.stderr
+        assert_one_line(verb(wire, "record", *words), code, part)
         assert list(tmp_path.iterdir()) == []
 
 

@@ -9,6 +9,7 @@ import pytest
 from holozen.testing import Terminal, Wire, wait_for
 
 from .conftest import deaf, start_sim
+from .processes import assert_one_line
 from .robots import Robot, moves, planar
 
 ROOT = Path(__file__).parents[2]
@@ -50,11 +51,7 @@ def assert_tidy(terminal: Terminal) -> None:
 
 
 def test_without_a_terminal_it_reports_that_in_one_line(town: Wire) -> None:
-    done = town.run("teleop")
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert done.stderr.count("\n") == 1
-    assert "needs a terminal" in done.stderr
+    assert_one_line(town.run("teleop"), 2, "needs a terminal")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP], ids=lambda n: n.name)

@@ -10,6 +10,7 @@ from holozen.transport.errors import ServiceError
 from holozen.wire import COMMAND_SILENCE, PRIORITY_OF
 
 from .conftest import Verb
+from .processes import assert_one_line
 from .robots import Robot, moves, rests
 
 PERSON, SCRIPT, AUTOPILOT = "INTERACTIVE_HIGH", "DATA", "DATA_LOW"
@@ -204,7 +205,4 @@ def test_controller_resume_reports_the_sims_reply(verb: Verb, town: Wire, robot:
 
 
 def test_controller_resume_without_a_sim_reports_it(verb: Verb, wire: Wire) -> None:
-    done = verb(wire, "controller", "--resume")
-    assert done.returncode == 1
-    assert done.stderr.startswith("controller: no reply from 'resume' within 5 s")
-    assert done.stderr.count("\n") == 1
+    assert_one_line(verb(wire, "controller", "--resume"), 1, "controller: no reply from 'resume' within 5 s")

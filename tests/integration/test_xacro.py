@@ -16,6 +16,7 @@ from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 
 from .conftest import Verb, start_sim
+from .processes import assert_one_line
 
 BOT = data.find("urdf", "hb_bot.urdf.xacro")
 ASKS = """<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">
@@ -63,11 +64,7 @@ def test_an_error_is_reported_in_one_line(
 ) -> None:
     if content is not None:
         (tmp_path / "robot.xacro").write_text(content)
-    done = xacro(str(tmp_path / "robot.xacro"), *words)
-    assert (done.returncode, done.stdout) == (code, "")
-    lines = done.stderr.splitlines()
-    assert len(lines) == 1, done.stderr
-    assert reason in lines[0]
+    assert_one_line(xacro(str(tmp_path / "robot.xacro"), *words), code, reason)
 
 
 @pytest.mark.parametrize(
