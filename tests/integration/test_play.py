@@ -84,8 +84,7 @@ def test_another_sim_on_the_same_keys_is_reported_and_a_signal_ends_all_of_it(ho
     assert "simulates here already" in other.terminal.raw
     assert game.left() == (before, temporary) and before
     other.terminal.close()
-    game.terminal.process.signal(signal.SIGTERM)
-    assert game.terminal.process.wait() == 128 + signal.SIGTERM
+    assert game.terminal.process.terminate() == 128 + signal.SIGTERM
     wait_for_none(game.wire)
     wait_for(lambda: game.left() == ({}, []))
     robot.wait_for_stop_command()

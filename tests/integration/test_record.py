@@ -219,8 +219,7 @@ def test_keys_that_include_each_other_are_recorded_once(wire: Wire, tmp_path: Pa
     recorder = wire.start("record", "a/b", "--topics", "a/*", "a/b", "-o", str(tmp_path / "a"))
     listening(wire, "a/b").put("a/b", b"once")
     wait_for(lambda: read(tmp_path / "a.mcap"))
-    recorder.signal(signal.SIGTERM)
-    assert recorder.wait() == 0
+    assert recorder.terminate() == 0
     assert [m.payload for m in read(tmp_path / "a.mcap")] == [b"once"]
 
 
@@ -240,8 +239,7 @@ def test_regular_expressions_choose_keys_and_leave_some_out(
         session.put(key, b"1")
     session.delete("a/b")
     wait_for(lambda: "end" in {m.channel.key for m in read(tmp_path / "a.mcap")})
-    recorder.signal(signal.SIGTERM)
-    assert recorder.wait() == 0
+    assert recorder.terminate() == 0
     assert [m.channel.key for m in read(tmp_path / "a.mcap")] == kept
     assert "deletions" not in recorder.out
 

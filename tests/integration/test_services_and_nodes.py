@@ -153,8 +153,7 @@ def test_clients_wait_for_their_router_and_find_it_again(wire: Wire) -> None:
 def test_a_client_that_waits_for_its_router_ends_on_a_signal(wire: Wire) -> None:
     with Process(command("pose-service", "--mode", "client", "--connect", wire.endpoint)) as service:
         service.wait_for_line("waiting for a Zenoh router")
-        service.signal(signal.SIGTERM)
-        service.wait()
+        service.terminate()
         assert "Traceback" not in service.err
 
 

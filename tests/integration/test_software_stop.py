@@ -172,8 +172,7 @@ with Bus("setter", Connection(connect=(sys.argv[1],), listen=()), lasting=True) 
 def test_it_outlives_its_source(town: Wire, fred: Robot, flood: Flood) -> None:
     with Process([sys.executable, "-c", SETTER, town.endpoint]) as setter:
         setter.wait_for_line("done")
-        setter.signal(signal.SIGKILL)
-        setter.wait()
+        setter.kill()
     flood.add("Fred/cmd_vel", Twist.planar(0.4), PERSON)
     stands_for(fred, 1.0, 1e-6)
     assert fred.status().stopped.startswith("setter@")

@@ -1,6 +1,5 @@
 """A software stop outlasts the sim, however that ends; where nobody knows whether a robot was stopped, it is."""
 
-import signal
 from collections.abc import Callable
 from pathlib import Path
 
@@ -52,8 +51,7 @@ def test_a_sim_that_is_killed_and_started_again_has_the_same_robots_stopped(wire
     (file,) = tmp_path.glob("*/*")
     file.unlink()
     ask(bus, "Fred/stop")  # again, which writes it again
-    sim.signal(signal.SIGKILL)
-    sim.wait()
+    sim.kill()
     sim = start(wire, tmp_path)
     assert setter(bus, "Fred").startswith("person@")
     assert setter(bus, "Ann") == ""
@@ -61,8 +59,7 @@ def test_a_sim_that_is_killed_and_started_again_has_the_same_robots_stopped(wire
         start(other, tmp_path)
         assert setter(other.bus(), "Fred") == "", "two networks share their stops"
     ask(bus, "Fred/release")
-    sim.signal(signal.SIGKILL)
-    sim.wait()
+    sim.kill()
     start(wire, tmp_path)
     assert setter(bus, "Fred") == ""
 
@@ -77,8 +74,7 @@ WRITTEN: dict[str, Callable[[str], list[str]]] = {
 def test_a_stop_outlasts_other_words_for_the_same_network(wire: Wire, tmp_path: Path, how: str) -> None:
     sim, bus = start(wire, tmp_path), wire.bus("person")
     ask(bus, "Fred/stop")
-    sim.signal(signal.SIGKILL)
-    sim.wait()
+    sim.kill()
     with Process([*command("sim", *ROBOTS, "--state", str(tmp_path)), *WRITTEN[how](wire.endpoint)]) as sim:
         sim.wait_for_line("sim: Fred is still stopped by person@")
         sim.wait_for_line("Ann listens on")
@@ -88,8 +84,7 @@ def test_a_stop_outlasts_other_words_for_the_same_network(wire: Wire, tmp_path: 
 def test_a_robot_whose_file_is_damaged_is_stopped_until_its_release(wire: Wire, tmp_path: Path) -> None:
     sim, bus = start(wire, tmp_path), wire.bus("person")
     ask(bus, "Fred/stop")
-    sim.signal(signal.SIGKILL)
-    sim.wait()
+    sim.kill()
     (file,) = tmp_path.glob("*/*")
     file.write_bytes(b"")
     sim = start(wire, tmp_path)
@@ -103,8 +98,7 @@ def test_a_robot_whose_file_is_damaged_is_stopped_until_its_release(wire: Wire, 
 def test_a_stop_follows_its_robot_to_a_sim_that_joins_another(wire: Wire, tmp_path: Path) -> None:
     sim, bus = start(wire, tmp_path), wire.bus("person")
     ask(bus, "Fred/stop")
-    sim.signal(signal.SIGKILL)
-    sim.wait()
+    sim.kill()
     wire.start("sim", "--empty", "--state", str(tmp_path)).wait_for_line("no robot yet")
     wire.start("sim", "--join", *ROBOTS, "--state", str(tmp_path)).wait_for_line("Ann listens on")
     assert setter(bus, "Fred").startswith("person@")

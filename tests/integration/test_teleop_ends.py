@@ -69,8 +69,7 @@ def test_a_signal_to_an_idle_teleop_publishes_nothing(town: Wire, robot: Robot) 
     with town.terminal("teleop") as terminal:
         terminal.wait_for_text("listening")
         commands = robot.commands.from_now()
-        terminal.process.signal(signal.SIGTERM)
-        assert terminal.process.wait() == 0
+        assert terminal.process.terminate() == 0
         robot.newest()
         assert commands.messages() == []
         assert_tidy(terminal)
@@ -141,8 +140,7 @@ def test_an_exception_stops_the_robot_and_is_one_error_line(
 
 def test_the_stop_arrives_though_a_subscriber_of_cmd_vel_reads_nothing(town: Wire, robot: Robot) -> None:
     with deaf(town, "cmd_vel"), driving(robot, town.terminal("teleop", *DRIVES_ON)) as terminal:
-        terminal.process.signal(signal.SIGTERM)
-        assert terminal.process.wait() == 0
+        assert terminal.process.terminate() == 0
         robot.stands()
         robot.wait_for_stop_command()
         assert_tidy(terminal)
@@ -155,8 +153,7 @@ def test_a_teleop_whose_sim_is_gone_quits_all_the_same(wire: Wire) -> None:
     terminal = driving(robot, wire.terminal("teleop", *DRIVES_ON))
     sim.kill()
     terminal.wait_for_text("ODOM IS STALE")
-    terminal.process.signal(signal.SIGTERM)
-    assert terminal.process.wait() == 0
+    assert terminal.process.terminate() == 0
 
     def stops() -> int:
         return sum(not any(planar(command)) for command in robot.commands.messages())

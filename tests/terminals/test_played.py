@@ -383,8 +383,7 @@ def test_it_pops_what_it_pushed_and_nothing_more(start: Start, robot: Robot) -> 
 def test_an_end_before_the_terminal_answered_leaves_it_tidy(town: Wire) -> None:
     with Played(command("teleop", *town.flags), KITTY, late=0.5) as terminal:
         wait_for(lambda: terminal.asked)
-        terminal.process.signal(signal.SIGTERM)
-        assert terminal.process.wait() == 0
+        assert terminal.process.terminate() == 0
         wait_for(lambda: terminal.flags_left == {})
         assert terminal.modes() == terminal.modes_before
 

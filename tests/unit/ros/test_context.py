@@ -266,8 +266,7 @@ def test_a_signal_ends_it(script: Script, case: str) -> None:
 def test_a_signal_ends_every_wait(script: Script) -> None:
     with script(WAITS) as process:
         process.wait_for_line("up")
-        process.signal(signal.SIGTERM)
-        assert process.wait() == 0, process.err
+        assert process.terminate() == 0, process.err
         assert not process.err
         assert process.out.splitlines()[-1] == "frame message node reader service writer"
 
