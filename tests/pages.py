@@ -19,7 +19,6 @@ python -m tests.pages NAME FOLDER
 import os
 import re
 import shlex
-import signal
 import subprocess
 import sys
 import time
@@ -189,8 +188,7 @@ def end(terminals: list[Terminal]) -> None:
     """Ctrl-C, in the one that was opened last first."""
     while terminals:
         terminal = terminals.pop()
-        terminal.process.signal(signal.SIGINT)
-        assert terminal.process.wait() in (0, 130), terminal.raw
+        assert terminal.process.interrupt() in (0, 130), terminal.raw
         terminal.close()
 
 

@@ -197,6 +197,11 @@ class Process:
         """Send it a signal."""
         self._popen.send_signal(number)
 
+    def interrupt(self, within: float = PATIENCE) -> int:
+        """Send SIGINT, as Ctrl-C does, wait for its end and return the exit code."""
+        self.signal(signal.SIGINT)
+        return self.wait(within)
+
     def terminate(self, within: float = PATIENCE) -> int:
         """Send SIGTERM, wait for its end and return the exit code."""
         self.signal(signal.SIGTERM)

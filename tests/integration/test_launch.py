@@ -1,7 +1,6 @@
 """Launch files as students of Gazebo lessons write them, with the real sim."""
 
 import os
-import signal
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -192,8 +191,7 @@ def test_a_lesson_in_gazebo_is_launched_and_its_controller_drives(wire: Wire, la
     assert "Traceback" not in process.err
     parts = children(process.pid)
     assert parts
-    process.signal(signal.SIGINT)
-    assert process.wait() == 0
+    assert process.interrupt() == 0
     wait_for(lambda: not any(Path(f"/proc/{pid}/cmdline").exists() for pid in parts))
 
 

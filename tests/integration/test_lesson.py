@@ -61,10 +61,8 @@ def test_the_controller_drives_round_the_shape_of_the_service_node(town: Wire, r
             assert len(corners) == {"triangle": 3, "square": 4, "hexagon": 6}[shape]
             for corner in [*corners, corners[0]]:
                 robot.odom.next(partial(is_at, goal=corner), within=60)
-            service.signal(signal.SIGINT)
-            assert service.wait() == 0
-        controller.signal(signal.SIGINT)
-        assert controller.wait() == 130
+            assert service.interrupt() == 0
+        assert controller.interrupt() == 130
     assert "Traceback" not in controller.err + service.err
     robot.stands()
 

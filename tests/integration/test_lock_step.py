@@ -3,7 +3,6 @@
 import hashlib
 import math
 import re
-import signal
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -270,8 +269,7 @@ def test_steps_end_with_ctrl_c_and_with_their_timeout(verb: Verb, sim: LockStep,
     beside = verb(town, "sim", "step")
     assert (beside.returncode, beside.stderr) == (1, "holozen sim: other steps are being made\n")
     assert interrupted.returncode is None, "whose steps go on"
-    interrupted.signal(signal.SIGINT)
-    assert interrupted.wait() == 130
+    assert interrupted.interrupt() == 130
     assert re.fullmatch(
         r"holozen sim step: interrupted: the goal was cancelled, \d+ steps before the last one\n", interrupted.err
     )

@@ -118,8 +118,7 @@ def test_force_sends_what_the_sim_then_refuses_and_reports_it(town: Wire, robot:
     words = ["{linear: {x: .nan}}", "-r", "20", "--force", "--wire", wire_name]
     pub = town.start("topic", "pub", "cmd_vel", *words)
     pub.wait_for_line("not obeyed: ")
-    pub.signal(signal.SIGINT)
-    assert pub.wait() == 0
+    assert pub.interrupt() == 0
     robot.stands()
 
 
@@ -186,16 +185,14 @@ def test_a_forced_mistake_is_named_also_where_another_one_drives(verb: Verb, tow
     robot.odom.next(lambda odom: moves(odom, 0.2, 0, 0))
     done = verb(town, "topic", "pub", "cmd_vel", '{"linear": {"x": 1e308}}', "--once", "--force")
     assert "not obeyed: linear.x is 1e+308 m/s; at most 100" in done.stderr
-    driver.signal(signal.SIGINT)
-    assert driver.wait() == 0
+    assert driver.interrupt() == 0
     robot.stands()
 
 
 def test_it_reports_that_the_sim_drives_slower_than_shown(town: Wire, robot: Robot) -> None:
     pub = town.start("topic", "pub", "cmd_vel", '{"linear": {"x": 99}}')
     assert "clamped" in pub.wait_for_line("over the limits of")
-    pub.signal(signal.SIGINT)
-    assert pub.wait() == 0
+    assert pub.interrupt() == 0
     robot.stands()
 
 
@@ -249,8 +246,7 @@ def test_ctrl_c_stops_the_joints(wire: Wire) -> None:
     heard = record(wire.bus("robot"), "joint_command", JointState)
     pub = wire.start("topic", "pub", "joint_command", "{name: [a], velocity: [1]}", "-r", "50")
     assert heard.next() == JointState(name=["a"], velocity=[1.0])
-    pub.signal(signal.SIGINT)
-    assert pub.wait() == 0
+    assert pub.interrupt() == 0
     wait_for(lambda: heard.messages()[-1] == still("a"), what="the stop")
 
 
@@ -316,8 +312,7 @@ def test_the_timeout_of_hz_is_for_the_first_messages_alone(town: Wire) -> None:
     hz = wait_for(begun)
     assert hz
     hz.wait_for_line("no new messages on ticks")
-    hz.signal(signal.SIGINT)
-    assert hz.wait() == 0
+    assert hz.interrupt() == 0
 
 
 def test_a_sim_that_receives_no_command_is_no_success(verb: Verb, town: Wire) -> None:

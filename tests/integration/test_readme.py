@@ -3,7 +3,6 @@
 import contextlib
 import re
 import shlex
-import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -74,8 +73,7 @@ def runs(line: str) -> None:
             started.type("\x03")
             assert started.process.wait() == 0, line
         else:
-            started.signal(signal.SIGINT)
-            assert started.wait() in (0, 130), f"{line}: {started.err}"
+            assert started.interrupt() in (0, 130), f"{line}: {started.err}"
             assert "Traceback" not in started.err, line
 
 

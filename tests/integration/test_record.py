@@ -49,8 +49,7 @@ def test_foreign_payloads_are_recorded_byte_for_byte_with_their_encodings(wire: 
     session.delete("any/0")  # it would be replayed as an empty message
     session.put("any/last", b"")
     wait_for(lambda: len(read(tmp_path / "a.mcap")) == len(PAYLOADS) + 1, what="the messages to be flushed")
-    recorder.signal(signal.SIGINT)
-    assert recorder.wait() == 0
+    assert recorder.interrupt() == 0
     assert f"{tmp_path / 'a.mcap'}: " in recorder.out
     assert f"{len(PAYLOADS) + 1} messages" in recorder.out
     assert "none dropped, 1 deletions left out" in recorder.out
@@ -102,8 +101,7 @@ def test_it_begins_with_what_latched_keys_hold(wire: Wire, tmp_path: Path, keys:
     wait_for(lambda: read(tmp_path / "a.mcap"), what="the map")
     wire.bus("later").publisher("tf_static", TFMessage).put(TFMessage([]))
     wait_for(lambda: len(read(tmp_path / "a.mcap")) == 2, what="the transforms")
-    recorder.signal(signal.SIGINT)
-    assert recorder.wait() == 0
+    assert recorder.interrupt() == 0
     found = [(m.channel.key, m.payload) for m in read(tmp_path / "a.mcap")]
     assert found == [("map", b'{"info": {"width": 3}}'), ("tf_static", codec.encode(TFMessage([])))]
 
@@ -132,8 +130,7 @@ def test_keys_on_which_nothing_arrived_are_named(wire: Wire, tmp_path: Path) -> 
     session.put("a/b", b"x")
     wait_for(lambda: read(tmp_path / "a.mcap"), what="the message to be flushed")
     recorder.wait_for_line("holozen record: nothing has arrived on b/*, cmdvel (did you mean 'cmd_vel'?)")
-    recorder.signal(signal.SIGINT)
-    assert recorder.wait() == 0
+    assert recorder.interrupt() == 0
     expected = "holozen record: nothing arrived on b/*, cmdvel (did you mean 'cmd_vel'?)"
     assert recorder.err.splitlines()[-1] == expected
 

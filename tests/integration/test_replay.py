@@ -84,8 +84,7 @@ def test_a_recording_is_played_to_a_second_recorder(verb: Verb, wire: Wire, tmp_
     recorder.wait_for_line("recording b")
     done = verb(wire, "replay", first, "--remap", "a:=b", "--json", "--start-offset", "0.1", "--until", "0.199")
     assert json.loads(done.stdout)["messages"] == 100, done.stderr
-    recorder.signal(signal.SIGINT)
-    assert recorder.wait() == 0, recorder.err
+    assert recorder.interrupt() == 0, recorder.err
     found = [int(m.payload) for m in read(tmp_path / "again.mcap")]
     assert found == sorted(found)
     assert set(found) <= set(range(100, 200))  # Zenoh drops some on a machine that is too busy
@@ -157,8 +156,7 @@ def test_a_robot_that_comes_while_it_plays_is_not_moved(verb: Verb, wire: Wire, 
     for _ in range(3):  # the bag has begun again
         notes.recv()
     assert max(abs(speed) for odom in robot.odom.messages() for speed in speeds(odom)) < 0.01
-    player.signal(signal.SIGINT)
-    assert player.wait() == 0
+    assert player.interrupt() == 0
     assert player.err == "Ann/drive is left out from here on: it moves robots; --commands plays it too\n"
 
 
@@ -263,8 +261,7 @@ def test_it_may_wait_before_it_begins(verb: Verb, wire: Wire, tmp_path: Path) ->
     bus = wire.bus()
     player = wire.start("bag", "play", "--delay", "1000", bag(tmp_path / "a.mcap", ("a", b"x", "", 0.0)))
     wait_for(lambda: on_key(bus.endpoints(), "a", "pub"))
-    player.signal(signal.SIGINT)
-    assert player.wait() == 0
+    assert player.interrupt() == 0
     assert player.out.startswith("played 0 messages")
     quick = verb(wire, "bag", "play", "-d", "0.1", str(tmp_path / "a.mcap"))
     assert quick.stdout.startswith("played 1 messages")
@@ -301,8 +298,7 @@ def test_a_loop_plays_until_it_is_ended(wire: Wire, tmp_path: Path) -> None:
     player = wire.start("replay", bag(tmp_path / "a.mcap", *[("a", b"x", "", i) for i in range(10)]), "--loop")
     for _ in range(31):
         assert tap.recv().payload == b"x"
-    player.signal(signal.SIGINT)
-    assert player.wait() == 0
+    assert player.interrupt() == 0
 
 
 def test_an_error_is_reported_in_one_line(

@@ -1,7 +1,6 @@
 """`holozen service`, `node` and `router`, and the command line as a whole."""
 
 import json
-import signal
 import subprocess
 from collections.abc import Iterator
 from importlib.metadata import version
@@ -179,8 +178,7 @@ def test_service_type_find_and_info(verb: Verb, town: Wire) -> None:
 def test_service_call_again_and_again(town: Wire) -> None:
     call = town.start("service", "call", "next_goal", "--rate", "50", "--json")
     wait_for(lambda: call.out.count("\n") >= 3)
-    call.signal(signal.SIGINT)
-    assert call.wait() == 130
+    assert call.interrupt() == 130
     assert set(call.out.splitlines()[:3]) == {call.out.splitlines()[0]}
 
 

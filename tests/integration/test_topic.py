@@ -1,7 +1,6 @@
 """`holozen topic` beside a sim that runs: list, info, echo, hz, pub, and their errors."""
 
 import json
-import signal
 import subprocess
 
 import pytest
@@ -61,8 +60,7 @@ def test_echo_as_json_is_one_object_a_line(town: Wire, robot: Robot) -> None:
     wait_for(lambda: echo.out.count("\n") >= 3)
     odoms = [json.loads(line) for line in echo.out.splitlines()[:3]]
     assert {odom["child_frame_id"] for odom in odoms} == {"footprint_link"}
-    echo.signal(signal.SIGINT)
-    assert echo.wait() == 130
+    assert echo.interrupt() == 130
     assert echo.err == ""
 
 
@@ -140,8 +138,7 @@ def test_hz_shows_the_rate(town: Wire, robot: Robot) -> None:
     hz = town.start("topic", "hz", "odom")
     hz.wait_for_line("std dev")
     assert 5 < float(hz.out.split()[2]) < 75  # of 50; a busy machine loses time
-    hz.signal(signal.SIGINT)
-    assert hz.wait() == 0
+    assert hz.interrupt() == 0
     assert hz.err == ""
 
 
@@ -155,8 +152,7 @@ def test_pub_drives_until_ctrl_c_and_stops_the_robot_then(town: Wire, robot: Rob
     robot.odom.next(lambda odom: moves(odom, 0.3, 0, 0))
     robot.pass_time(0.7)
     assert moves(robot.newest(), 0.3, 0, 0)
-    pub.signal(signal.SIGINT)
-    assert pub.wait() == 0
+    assert pub.interrupt() == 0
     robot.stands()
     robot.wait_for_stop_command()
 

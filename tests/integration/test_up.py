@@ -60,8 +60,7 @@ def test_two_signals_in_a_row_leave_nothing_either(wire: Wire) -> None:
     up = wire.start("up")
     all_run(wire, PARTS)
     up.signal(signal.SIGINT)
-    up.signal(signal.SIGINT)
-    up.wait()
+    up.interrupt()
     wait_for_none(wire)
     assert "Traceback" not in up.err
 
@@ -69,8 +68,7 @@ def test_two_signals_in_a_row_leave_nothing_either(wire: Wire) -> None:
 def test_a_signal_right_at_the_start_leaves_nothing(wire: Wire) -> None:
     up = wire.start("up")
     up.wait_for_line("no terminal here")
-    up.signal(signal.SIGINT)
-    up.wait()
+    up.interrupt()
     wait_for_none(wire)
     assert "Traceback" not in up.err
 
@@ -80,8 +78,7 @@ def test_a_part_that_hangs_is_killed_and_reported(wire: Wire) -> None:
     sim = all_run(wire, PARTS)["sim"]
     os.kill(sim, signal.SIGSTOP)
     wait_for(lambda: state_of(sim) == "T")  # of two signals that wait, the kernel delivers SIGTERM first
-    up.signal(signal.SIGINT)
-    assert up.wait(AT_MOST) == 0
+    assert up.interrupt(AT_MOST) == 0
     assert parts_at(wire) == {}
     assert "up: sim did not end within 0.5 s and was killed" in up.err
 
@@ -210,8 +207,7 @@ def test_a_part_that_dies_is_started_again_and_moves_no_robot(wire: Wire) -> Non
             assert wire.run("release").returncode == 0
         wait_for(robot.resume)
     driven(robot)
-    up.signal(signal.SIGINT)
-    assert up.wait(AT_MOST) == 0
+    assert up.interrupt(AT_MOST) == 0
     assert parts_at(wire) == {}
 
 

@@ -1,7 +1,6 @@
 """`holozen xacro` prints what the library expands, and with --watch does so on every save."""
 
 import shutil
-import signal
 import subprocess
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
@@ -138,8 +137,7 @@ def test_an_error_is_one_line_and_cleared_by_the_next_good_save_until_ctrl_c(rob
     assert "No such file or directory" in reported(watcher, 4)
     robot.write_text(text)
     assert reported(watcher, 5).startswith(f"{robot} expanded, ")
-    watcher.signal(signal.SIGINT)
-    assert watcher.wait() == 0
+    assert watcher.interrupt() == 0
     reported(watcher, 5)
 
 

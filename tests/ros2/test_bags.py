@@ -96,8 +96,7 @@ def test_the_metadata_counts_what_is_in_each_file(wire: Wire, tmp_path: Path) ->
         return (folder / "long_1.mcap").exists()
 
     wait_for(split)
-    recorder.signal(signal.SIGINT)
-    assert recorder.wait() == 0, recorder.err
+    assert recorder.interrupt() == 0, recorder.err
     info = yaml.safe_load((folder / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
     assert [one["path"] for one in info["files"]] == info["relative_file_paths"]
     assert sum(one["message_count"] for one in info["files"]) == info["message_count"]

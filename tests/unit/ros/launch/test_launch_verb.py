@@ -78,8 +78,7 @@ def test_gazebos_own_launch_files_start_the_sim(my_bot: Path, wire: Wire, words:
     with Process(line(wire, *words), env=environment()) as launch:
         launch.wait_for_line("`holozen sim` replaces Gazebo")
         launch.wait_for_line("no robot yet")
-        launch.signal(signal.SIGINT)
-        assert launch.wait() == 0
+        assert launch.interrupt() == 0
     assert "does not use" not in launch.err
 
 
@@ -169,8 +168,7 @@ def test_a_value_that_nothing_uses_is_reported_while_the_launch_goes_on(
     write("a.launch.py", described(*ARGUMENTS, *actions))
     with Process(line(wire, "a.launch.py", "kpp:=3"), env=environment()) as going:
         assert going.wait_for_line("does not use 'kpp' (did you mean 'kp'?)")
-        going.signal(signal.SIGINT)
-        assert going.wait() == 0
+        assert going.interrupt() == 0
     assert going.err.count("kpp") == 1
 
 
