@@ -56,6 +56,10 @@ class Parser(argparse.ArgumentParser):
             return None
         return super()._parse_optional(arg_string)
 
+    def _get_option_tuples(self, option_string: str) -> Any:
+        """As argparse, except that `-m` is no abbreviation of `-model`; `-r10` is still `-r 10`."""
+        return [found for found in super()._get_option_tuples(option_string) if len(found[1]) == 2]
+
     def error(self, message: str) -> NoReturn:
         """Report the mistake, and exit with code 2."""
         verbs = [action.choices for action in self._actions if isinstance(action, argparse._SubParsersAction)]
@@ -65,8 +69,9 @@ class Parser(argparse.ArgumentParser):
         before, _, left = message.partition("unrecognized arguments: ")
         if left and not before:
             message = f"unexpected argument {left!r}"
-            if "--robot" in self._option_string_actions and not left.startswith("-"):
-                message += "; a robot's file goes after --robot"
+            kind = "world" if left.endswith(".world") else "robot"
+            if "--world" in self._option_string_actions and not left.startswith("-"):
+                message += f"; a {kind}'s file goes after --{kind}"
         if not verbs and (flag := self._unknown_flag(message, [] if before else left.split())):
             message = f"no flag {flag!r}{suggest(flag, self._option_string_actions)}"
         report(f"{self.prog}: {message}; see `{self.prog} --help`")

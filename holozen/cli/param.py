@@ -143,7 +143,8 @@ def get(args: argparse.Namespace, nodes: Nodes, node: str) -> int:
 def set_values(args: argparse.Namespace) -> int:
     """Set the values that are given, all or none of them."""
     if len(args.pairs) % 2:
-        VERBS["param set"].parser().error(f"{args.pairs[-1]!r} has no value; write NAME VALUE, or more such pairs")
+        wrong = f"{args.pairs[-1]!r} has no value; write NODE NAME VALUE, or more such pairs"
+        VERBS["param set"].parser().error(wrong)
     names = args.pairs[::2]
     if len(set(names)) < len(names):
         raise BusError(f"a parameter is named twice: {', '.join(names)}")

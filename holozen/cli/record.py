@@ -184,7 +184,7 @@ class Progress:
         """Report progress, unless the last report is too recent."""
         if self._missing is None and now - self._begun >= SILENT and (silent := self.look()):
             self._over.show("")
-            report(f"holozen record: nothing has arrived on {silent}")
+            report(f"nothing has arrived on {silent}")
         if now - self._reported < (1.0 if self._json else REPORT_EVERY[self._over.shown]):
             return
         self._reported = now

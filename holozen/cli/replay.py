@@ -167,7 +167,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--start-offset", type=number(0, 1e9, "s"), default=0.0, metavar="S", help="start S seconds into the bag")
     add("--until", type=number(0, 1e9, "s"), metavar="S", help="stop S seconds after the start of the bag")
     add("--topics", nargs="+", type=key, metavar="KEY", help="only these keys or key expressions")
-    add("--remap", nargs="+", type=_remap, default=[], metavar="OLD:=NEW", help="play on another key")
+    add("-m", "--remap", nargs="+", type=_remap, default=[], metavar="OLD:=NEW", help="play on another key")
     add(
         "-d",
         "--delay",

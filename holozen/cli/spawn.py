@@ -325,6 +325,12 @@ def _name(text: str) -> str:
     return flags.robot(text)
 
 
+def _namespace(text: str) -> str:
+    """Parses a robot's namespace; a slash is the root."""
+    flags.robot(text.strip("/"))
+    return text
+
+
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("words", nargs="*", metavar="FILE [name:=value]", help="the file, and values of its xacro:arg")
@@ -334,7 +340,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         add(f"-{flag}", type=flags.number(-FAR, FAR, "m"), metavar="m", help=PLACES[flag])
     for flag in "RPY":
         add(f"-{flag}", type=flags.number(-TURN, TURN, "rad"), metavar="rad", help=PLACES[flag])
-    add("--namespace", "-robot_namespace", default="", metavar="NAME",
+    add("--namespace", "-robot_namespace", type=_namespace, default="", metavar="NAME",
         help="its keys are below this; / is the root (default: its name)")  # fmt: skip
     add("--timeout", "-timeout", type=flags.number(0.1, 3600, "s"), default=0.0, metavar="S",
         help=f"seconds to wait for a sim (default: {PATIENCE:g})")  # fmt: skip

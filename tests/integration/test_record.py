@@ -129,7 +129,7 @@ def test_keys_on_which_nothing_arrived_are_named(wire: Wire, tmp_path: Path) -> 
     _robot = wire.bus("sim").subscribe("cmd_vel", Twist)
     session.put("a/b", b"x")
     wait_for(lambda: read(tmp_path / "a.mcap"), what="the message to be flushed")
-    recorder.wait_for_line("holozen record: nothing has arrived on b/*, cmdvel (did you mean 'cmd_vel'?)")
+    recorder.wait_for_line("nothing has arrived on b/*, cmdvel (did you mean 'cmd_vel'?)")
     assert recorder.interrupt() == 0
     expected = "holozen record: nothing arrived on b/*, cmdvel (did you mean 'cmd_vel'?)"
     assert recorder.err.splitlines()[-1] == expected
