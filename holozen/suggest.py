@@ -99,6 +99,14 @@ def listed(names: Iterable[str], most: int = 12) -> str:
     return shown + f" and {len(names) - most} more" if len(names) > most else shown or "none"
 
 
+def yaml_problem(error: Exception) -> str:
+    """What is wrong with a YAML text, and where, in one line."""
+    why = " ".join(str(getattr(error, "problem", None) or error).split())
+    mark = getattr(error, "problem_mark", None)
+    spaces = "; write spaces instead of tabs" if "'\\t'" in why else ""
+    return why + (f" (line {mark.line + 1}, column {mark.column + 1})" if mark else "") + spaces
+
+
 def article(name: str) -> str:
     """The name of a class with its article: `an int`, `a uint8`, `an Odometry`."""
     return f"an {name}" if name[:1] in tuple("aeioAEIO") else f"a {name}"

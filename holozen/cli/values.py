@@ -10,7 +10,7 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from holozen.limits import not_finite
-from holozen.suggest import cut
+from holozen.suggest import cut, yaml_problem
 
 if TYPE_CHECKING:
     from holozen.messages.definitions import Interface
@@ -115,7 +115,4 @@ def _yaml(text: str, why_no_json: ValueError) -> Any:
     try:
         return yaml.load(text, Loader)
     except yaml.YAMLError as error:
-        why = getattr(error, "problem", None) or " ".join(str(error).split())
-        mark = getattr(error, "problem_mark", None)
-        where = f" (line {mark.line + 1}, column {mark.column + 1})" if mark else ""
-        raise ValueError(f"{cut(text)} is not valid JSON or YAML: {why}{where}") from None
+        raise ValueError(f"{cut(text)} is not valid JSON or YAML: {yaml_problem(error)}") from None

@@ -321,12 +321,13 @@ class Registry:
             hint = suggest(package, there) or f"; known: {listed(there, MAX_SHOWN)}"
             return f"no package {package!r} with interfaces{hint}; give its folder: --package {package}=DIR"
         last = last_part(name)
-        if near := OTHER_WORDS.get(last, last.lower() if last.lower() in PRIMITIVES else ""):
-            return f"no type {name!r}; write {near}"
+        elsewhere = [full for full in self.names() if full.endswith(f"/msg/{last}" if self._open else f"/{last}")]
         if self._open:  # a file names messages only, without their kind
-            name, known = _short(name), [*map(_short, known), *PRIMITIVES]
-            if elsewhere := [_short(full) for full in self.names() if full.endswith(f"/msg/{last}")]:
-                return f"no type {name!r}; write {' or '.join(elsewhere)}"
+            if near := OTHER_WORDS.get(last, last.lower() if last.lower() in PRIMITIVES else ""):
+                return f"no type {name!r}; write {near}"
+            name, known, elsewhere = _short(name), [*map(_short, known), *PRIMITIVES], [*map(_short, elsewhere)]
+        if elsewhere:
+            return f"no type {name!r}; write {' or '.join(elsewhere)}"
         return f"no type {name!r}{suggest(name, known, last_part) or '; known: ' + listed(known, MAX_SHOWN)}"
 
 

@@ -67,7 +67,8 @@ def explain(error: ModuleNotFoundError, line: str) -> str:
         return _installed[0].unknown(name)
     if error.msg != f"No module named {name!r}" or "." in name:
         return ""
-    return f"{error.msg}; install it with pip, or give the folder of a package of yours: --package {name}=DIR"
+    near = suggest(name, _tops(name), alike=0.8)
+    return f"{error.msg}{near}; install it with pip, or give the folder of a package of yours: --package {name}=DIR"
 
 
 class _Loader:
@@ -243,7 +244,7 @@ def _missing_name(module: str, name: str, known: Sequence[str]) -> str:
     full = f"{module}.{name}"
     if full in HINTS:
         hint = f"; {HINTS[full]}"
-    elif place := _defined_in(name, module.partition(".")[0]):
+    elif place := next(filter(None, (_defined_in(name, top) for top in _tops(module.partition(".")[0]))), ""):
         hint = f"; it is in {place}"
     else:
         below = (each for each in MODULES if each.startswith(f"{module}."))
@@ -251,12 +252,18 @@ def _missing_name(module: str, name: str, known: Sequence[str]) -> str:
     return f"{module} has no {name!r} here{hint}; see {PAGE}"
 
 
+def _tops(name: str) -> list[str]:
+    """The top-level packages of ROS: `name` first, then those with the same first word."""
+    tops = dict.fromkeys(module.partition(".")[0] for module in MODULES)
+    return sorted(tops, key=lambda top: (top != name, top.partition("_")[0] != name.partition("_")[0]))
+
+
 def _defined_in(name: str, top: str) -> str:
-    """The module of a top-level package of ROS that has this name; empty if none has."""
+    """The module of a top-level package of ROS that has this name; empty if none has. launch_ros has modules only."""
     found = [
         module
         for module, ours in MODULES.items()
-        if module.partition(".")[0] == top and name in import_module(ours).__all__
+        if module.partition(".")[0] == top and name in import_module(ours).__all__ and module != "launch_ros"
     ]
     return next((module for module in found if module.endswith(f".{_snake_case(name)}")), "".join(found[:1]))
 

@@ -15,6 +15,8 @@ from collections.abc import Iterator
 from contextlib import nullcontext
 from typing import Any, NamedTuple
 
+from holozen.suggest import yaml_problem
+
 Value = bool | int | float | str | list[bool] | list[int] | list[float] | list[str]
 
 LARGEST = 1_000_000  # characters of a file or a value
@@ -91,7 +93,7 @@ def _composed(text: str) -> Any:
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
     except (yaml.YAMLError, ValueError) as error:
-        raise ValueError(f"invalid YAML: {' '.join(str(error).split())}") from None
+        raise ValueError(f"invalid YAML: {yaml_problem(error)}") from None
 
 
 def _parsed(text: str) -> Any:

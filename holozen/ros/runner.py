@@ -20,6 +20,7 @@ from holozen.process import INTERRUPTED
 from holozen.ros import tracebacks
 from holozen.ros.executables import Script
 from holozen.ros.rclpy.context import ExternalShutdownException, end_at_exit
+from holozen.suggest import suggest
 from holozen.transport.errors import BusError
 
 OF_EXTRA = ("numpy", "transforms3d")  # installed by `pip install 'holozen[run]'`
@@ -149,7 +150,8 @@ def _execute(script: Script) -> None:
 def _call(script: Script) -> Any:
     found: Any = importlib.import_module(script.module)
     for name in script.function.split("."):
-        found = getattr(found, name)
+        known, found = dir(found), getattr(found, name, None)
     if not callable(found):
-        raise TypeError(f"{script.module}:{script.function} is not a function")
+        entry = f"{script.module}:{script.function}"
+        raise TypeError(f"{entry} in the package's setup file is not a function{suggest(name, known)}")
     return found()

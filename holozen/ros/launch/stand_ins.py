@@ -24,7 +24,8 @@ from holozen.suggest import listed, suggest
 ROOT = "/"  # the namespace of a robot without one: its keys are cmd_vel and odom
 SPAWN_TIMEOUT = "60"  # s for the sim to start
 NOWHERE = Path("/holozen-stands-in-for")  # the folder of packages that exist by name only
-NO_WINDOW = "launch: Gazebo's window is left out; `holozen map` in another terminal shows the robots"
+SHOWN = "`holozen view` or `holozen map` in another terminal shows the robots"
+NO_WINDOW = f"launch: Gazebo's window is left out; {SHOWN}"
 
 
 class Instead(NamedTuple):
@@ -43,13 +44,8 @@ INSTEAD = {
     "joint_state_publisher_gui/*": Instead(
         reason="the sim publishes joint_states; `holozen topic pub joint_command` moves joints"
     ),
-    "rviz2/*": Instead(
-        "holozen view` or `holozen map",
-        "`holozen map` in another terminal shows the robots, `holozen topic echo` the messages",
-    ),
-    "gazebo_ros/gzclient": Instead(
-        "holozen view` or `holozen map", "`holozen map` in another terminal shows the robots"
-    ),
+    "rviz2/*": Instead("holozen view` or `holozen map", SHOWN),
+    "gazebo_ros/gzclient": Instead("holozen view` or `holozen map", SHOWN),
     "ros_gz_bridge/*": Instead(reason=ON_THE_KEYS),
     "ros_ign_bridge/*": Instead(reason=ON_THE_KEYS),
     "ros_gz_image/*": Instead(reason=ON_THE_KEYS),
@@ -223,7 +219,7 @@ class Simulation(Action):
         if not Path(world).is_file() and ours.is_file():
             world = str(ours)
         words = holozen_command(context, "sim", "--empty", "--world", world, *package_flags())
-        report("launch: `holozen sim` replaces Gazebo; `holozen map` in another terminal shows what is in it")
+        report(f"launch: `holozen sim` replaces Gazebo; {SHOWN}")
         context.runner.start(self.target, Program("sim", words, environment=context.environment, required=True))
         return None
 

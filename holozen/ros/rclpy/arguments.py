@@ -131,4 +131,5 @@ def _take(found: Arguments, flag: str, words: Iterator[str]) -> None:
             found.levels.append((name, get_logging_severity_from_string(level)))
         # The other flags are accepted and have no effect.
     except (ValueError, RuntimeError, NameValidationException) as error:
-        raise RCLInvalidROSArgsError(printable(f"{flag} {text}: {error}")) from None
+        given = flag if full == FILE else f"{flag} {text}"  # that error names the file
+        raise RCLInvalidROSArgsError(printable(f"{given}: {error}")) from None

@@ -108,6 +108,8 @@ def test_a_package_that_is_given_comes_before_ours(lesson: Path) -> None:
 def test_a_wrong_name_is_reported_with_the_closest(lesson: Path) -> None:
     for name, reason in [
         ("geometry_msgs/msg/Twsit", "no type 'geometry_msgs/msg/Twsit' (did you mean 'geometry_msgs/msg/Twist'?)"),
+        ("nav_msgs/msg/Twist", "no type 'nav_msgs/msg/Twist'; write geometry_msgs/msg/Twist"),
+        ("std_msgs/msg/string", "no type 'std_msgs/msg/string' (did you mean 'std_msgs/msg/String'?)"),
         ("geometry_msgs/msg/TWIST", " (did you mean 'geometry_msgs/msg/Twist'?)"),
         ("rosgraph_msgs/msg/Zzzzz", "; known: rosgraph_msgs/msg/Clock"),
         ("geometry_msg/msg/Twist", "no package 'geometry_msg' with interfaces (did you mean 'geometry_msgs'?)"),

@@ -105,7 +105,7 @@ def test_what_cannot_be_read_is_reported_in_one_line() -> None:
         (["-p", "x:=[1"], "invalid YAML"),
         (["-p", "x:=99999999999999999999"], "64-bit"),
         (["-p", "x:=" + "[" * 1000], "nested"),
-        (["--params-file", "/nowhere.yaml"], "cannot read /nowhere.yaml"),
+        (["--params-file", "/nowhere.yaml"], "--params-file: cannot read /nowhere.yaml"),
         (["--log-level", "loud"], "use one of unset, debug, info"),
     ]:
         with pytest.raises(RCLInvalidROSArgsError) as error:

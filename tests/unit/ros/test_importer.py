@@ -193,6 +193,7 @@ def test_an_unknown_package_is_reported_with_the_nearest_and_the_folders_searche
     assert "did you mean 'std_msgs'?" in line("import std_mgs.msg")
     assert "did you mean 'geometry_msgs'?" in line("import geometri_msgs")
     assert "--package zebra=DIR" in line("from zebra.msg import X")
+    assert "No module named 'rclp' (did you mean 'rclpy'?); install it with pip" in line("import rclp")
     hint = "install it with pip, or give the folder of a package of yours: --package zebra=DIR"
     assert line("import zebra") == f"{script}:1: No module named 'zebra'; {hint}"
 
@@ -277,6 +278,8 @@ def test_what_a_module_of_ros_lacks_is_reported(pretend: ModuleType) -> None:
     assert refused("import rclpy.pretend\nrclpy.pretend.Thign", AttributeError) == expected
     assert refused("from rclpy.pretend import hidden") == f"rclpy.pretend has no 'hidden' here{page}"
     assert refused("from rclpy.pretend import Other") == f"rclpy.pretend has no 'Other' here; it is in rclpy{page}"
+    expected = f"launch.actions has no 'Node' here; it is in launch_ros.actions{page}"
+    assert refused("from launch.actions import Node") == expected
     assert refused("import rclpy\nrclpy.__file__", AttributeError) == "rclpy has no '__file__'"
     assert "did you mean 'rclpy.pretend'?" in refused("import rclpy.pretens", ModuleNotFoundError)
     assert "this belongs to ROS 1; use ROS 2's rclpy" in refused("import rospy", ModuleNotFoundError)

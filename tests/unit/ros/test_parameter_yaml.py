@@ -64,6 +64,7 @@ def test_a_wrong_file_is_reported_in_one_line(file: Path) -> None:
         ("[1, 2]", "it has no names with values"),
         ("tom: {ros__parameters: 5}", "ros__parameters of /tom has no names"),
         ("tom: [", "invalid YAML"),
+        ("tom:\n\tx: 1", "start any token (line 2, column 1); write spaces instead of tabs"),
         ("tom: {ros__parameters: {x: [1, a]}}", "line 1: all values of a list must have one type"),
         ("? [a]\n: 1", "a name must be a word"),
         ("a: &a [x, x]\n" + "".join(f"b{i}: &b{i} {{x: *a, y: *a}}\n" for i in range(3)), "outside of"),

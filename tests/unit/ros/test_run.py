@@ -102,6 +102,10 @@ def test_an_executable_of_a_package_is_found(run: Run, write: Write, my_bot: Pat
     assert run("my_bot", "a").stdout == "a script\n"
     done = run("my_bot", "b")
     assert (done.stdout, done.returncode) == ("a function my_bot.b\n", 7)
+    write("src/my_bot/setup.py", "setup(entry_points={'console_scripts': ['b = my_bot.b:Main.strat']})")
+    done = run("my_bot", "b")
+    expected = "my_bot.b:Main.strat in the package's setup file is not a function (did you mean 'start'?)\n"
+    assert (done.returncode, done.stderr) == (1, f"TypeError: {expected}")
 
 
 def test_the_exit_code_is_the_scripts(run: Run, write: Write) -> None:

@@ -65,7 +65,7 @@ def test_the_folder_of_gazebo_ros_is_asked_for_in_python_too(follow: Follow) -> 
 def test_server_and_window_are_one_sim(follow: Follow, capsys: pytest.CaptureFixture[str]) -> None:
     kept = follow([included("gazebo_ros", name) for name in ("gzserver.launch.py", "gzclient.launch.py")])
     assert len(kept.programs) == 1
-    assert "Gazebo's window is left out; `holozen map`" in capsys.readouterr().err
+    assert "Gazebo's window is left out; `holozen view`" in capsys.readouterr().err
     both = follow([included("gazebo_ros", "gazebo.launch.py"), included("gazebo_ros", "gzserver.launch.py")])
     assert len(both.programs) == 1
 

@@ -142,7 +142,7 @@ def test_a_group_that_is_not_scoped_lets_it_out(follow: Follow) -> None:
 
 def test_what_is_left_out_is_named_with_what_to_use(follow: Follow, capsys: pytest.CaptureFixture[str]) -> None:
     for package, executable, message in [
-        ("rviz2", "rviz2", "launch: rviz2 is left out: `holozen map` in another terminal"),
+        ("rviz2", "rviz2", "launch: rviz2 is left out: `holozen view` or `holozen map` in another terminal"),
         ("rqt_graph", "rqt_graph", "is left out: `holozen plot`"),
         ("joint_state_publisher_gui", "joint_state_publisher_gui", "is left out: the sim publishes joint_states"),
         ("ros_gz_bridge", "parameter_bridge", "is left out: the sim is on the keys itself"),
