@@ -81,16 +81,14 @@ def _held(bus: Bus, key: str) -> Iterable[TFMessage]:
 
 
 def _why(bus: Bus, key: str, frames: Frames, error: LookupError) -> str:
-    if frames.names():
-        return str(error)
     if not bus.connected():
         return f"no transforms on {key}; {no_nodes(bus.where)}"
     others = {end.key.rpartition("/")[0] for end in bus.endpoints() if end.kind == "pub" and _TF.match(end.key)}
     flags = ["without --robot"] if "" in others and key != "tf" else []
     if named := others - {"", key.rpartition("/")[0]}:
         flags.append(f"with --robot {listed(named)}")
-    hint = f"; there are some {' and '.join(flags)}" if flags else ""
-    return f"no transforms on {key}{hint}"
+    hint = f"; there are {'others' if frames.names() else 'some'} {' and '.join(flags)}" if flags else ""
+    return f"{error if frames.names() else f'no transforms on {key}'}{hint}"
 
 
 def _print(args: argparse.Namespace, pose: Transform, stamp: float) -> None:

@@ -208,12 +208,7 @@ class Trace:
         def wrapped(node: Any, *rest: Any) -> None:
             depth, place = len(self.calls), place_of(node)
             self._call(node, "included at")
-            try:
-                function(node, *rest)
-            except self.library.XacroException as error:
-                if self._element is node and isinstance(error.exc, OSError):
-                    del self.calls[depth:]  # a missing file was not included
-                raise
+            function(node, *rest)
             del self.calls[depth:]
             self._element, self.place = node, place or self.place
 
@@ -336,13 +331,12 @@ MAX_MEMORY = 512 << 20  # bytes of address space of the child
 def describe(error: BaseException, trace: Trace, path: Path, guesses: Mapping[str, Path]) -> str:
     """File, line, reason, hint, and the chain of macros and includes. `guesses` are packages found by location only."""
     cause, suffix = _cause(error)
-    chain = _chain(trace.calls)
     if isinstance(cause, RobotError):
-        return f"{_placed(str(cause), path, trace)}{chain}"
+        return _chained(_placed(str(cause), path, trace), trace)
     if isinstance(cause, ExpatError):
         file = _last_file(trace)
         text = _text(file)
-        return f"{Place(file, cause.lineno)}: {broken_xml(cause, text, _still_open(cause, text) + chain)}"
+        return f"{Place(file, cause.lineno)}: {broken_xml(cause, text, _still_open(cause, text) + _chain(trace.calls))}"
     args = trace.library.substitution_args_context.get("arg", {})
     hint = getattr(cause, "hint", "") or (_guessed(guesses) if isinstance(cause, OSError) else "")
     if type(cause).__name__ == "ArgException":
@@ -351,7 +345,7 @@ def describe(error: BaseException, trace: Trace, path: Path, guesses: Mapping[st
         hint = "; xacro:include has no package://; write $(find PACKAGE)/..."
     elif found := _NO_COMMAND.match(str(cause)):
         hint = suggest(found[1].split()[0], COMMANDS) or f"; to calculate, write ${{{shorten(found[1], 80)}}}"
-    return f"{_where(cause, trace)}: {_reason(cause, suffix)}{hint}{chain}"
+    return _chained(f"{_where(cause, trace)}: {_reason(cause, suffix)}{hint}", trace)
 
 
 def _placed(message: str, path: Path, trace: Trace) -> str:
@@ -409,6 +403,12 @@ def _cause(error: Any) -> tuple[BaseException, str]:
         suffix = getattr(error, "suffix", None) or suffix
         error = error.exc
     return error, one_line(suffix, 200)
+
+
+def _chained(message: str, trace: Trace) -> str:
+    """The message with the macros and includes it is in; an include that failed itself is not one of them."""
+    failed = message.startswith(f"{trace.place}: ") and trace.calls[-1:] == [f"included at {trace.place}"]
+    return message + _chain(trace.calls[:-1] if failed else trace.calls)
 
 
 def _chain(calls: list[str], most: int = 6) -> str:

@@ -245,7 +245,8 @@ class Follower:
                 self._report_hold(f"goal {number} is more than {MAX_DISTANCE:g} m away; waiting for another")
             except NoReply as silence:
                 absence = self._absence()
-                self._report_hold(f"waiting for goal {number}: {silence}{'; ' * bool(absence)}{absence}")
+                reason = f"{silence}; `holozen pose-service` starts one{'; ' * bool(absence)}{absence}"
+                self._report_hold(f"waiting for goal {number}: {reason}")
             except ServiceError as failure:
                 self._report_hold(f"goal {number}: {failure}")
                 if number:  # the list got shorter: this lap is over

@@ -62,9 +62,7 @@ def _ros_1(word: str) -> RosArgument:
 
 def _ros_2(flag: str, word: str | None) -> RosArgument:
     if flag not in ROS_2:
-        raise _wrong(
-            flag, "cannot be followed; of --ros-args there are -p NAME:=VALUE and -r NAME:=NAME, and -- ends them"
-        )
+        raise _wrong(flag, "not a ROS argument; -- ends those, which are -p NAME:=VALUE and -r NAME:=NAME")
     left, given, value = (word or "").partition(":=")
     if not given:
         raise _wrong(f"{flag} {word or ''}".strip(), "write NAME:=VALUE after it, such as -p speed:=0.9")

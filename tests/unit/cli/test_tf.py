@@ -89,3 +89,7 @@ def test_a_robot_without_transforms_is_reported_with_those_that_have_some(wire: 
     both = "there are some without --robot and with --robot Fred"
     assert run(*words, "hb_bot")[2] == f"holozen tf echo: no transforms on hb_bot/tf; {both}\n"
     assert run(*words, "Fred")[2] == "holozen tf echo: no transforms on Fred/tf; there are some without --robot\n"
+    bus.publisher("tf_static", TFMessage).put(tf("odom", "base_link", 1.0, 2.0))
+    err = run("tf", "echo", "Fred/odom", "base_link", "--timeout", "0.2")[2]
+    assert err.startswith("holozen tf echo: no frame 'Fred/odom'")
+    assert err.endswith("frames: base_link, odom; there are others with --robot Fred\n")

@@ -155,6 +155,7 @@ def test_it_waits_for_the_service_and_reports_it_once(case: Case) -> None:
     lap = case.lap()
     wait_for(lambda: case.reports)
     assert "waiting for goal 0: no reply from 'next_goal' within 0.5 s" in case.reports[0]
+    assert case.reports[0].endswith("; `holozen pose-service` starts one")
     case.goals()
     assert len(lap.result(30)) == 2
     assert case.reports[1] == "continues"

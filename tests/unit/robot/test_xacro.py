@@ -143,6 +143,8 @@ def test_an_unknown_package_is_reported_with_the_way_out(home: Path, folder: Pat
     message = failure(path)
     assert message.startswith(f"{path}, line 2: there is no package 'holo'; packages found: none;")
     assert message.endswith("--package holo=DIR")
+    including = failure(write(home, '<xacro:include filename="$(find holo)/a.xacro"/>'))
+    assert including.endswith("--package holo=DIR")  # nothing was included
 
 
 def test_broken_xml_is_reported_with_its_line(folder: Path) -> None:

@@ -72,7 +72,7 @@ def test_what_cannot_be_followed_is_named_in_one_line() -> None:
 
 def test_other_flags_of_ros_2_are_named_too() -> None:
     for flag in ["--params-file", "--log-level", "--enclave", "--disable-stdout-logs", "speed:=1"]:
-        with pytest.raises(InputError, match=f"^{flag}: cannot be followed; .*-p NAME:=VALUE"):
+        with pytest.raises(InputError, match=f"^{flag}: not a ROS argument; .*-p NAME:=VALUE"):
             ros_arguments(["--ros-args", flag, "x"])
 
 
