@@ -68,7 +68,8 @@ def motion_of(command: JointState) -> JointMotion:
     if len(kinds) != 1:
         raise ValueError(f"give one of position, velocity and effort; {' and '.join(kinds) or 'none'} has values")
     if len(command.name) != len(given[kinds[0]]):
-        raise ValueError(f"{len(command.name)} names and {len(given[kinds[0]])} values of {kinds[0]}; give as many")
+        names, values = len(command.name), len(given[kinds[0]])
+        raise ValueError(f"name has length {names}, {kinds[0]} has {values}; give each joint one value")
     if len(set(command.name)) != len(command.name):
         raise ValueError("a joint is named twice")
     return JointMotion(kinds[0], tuple(zip(command.name, given[kinds[0]], strict=True)))

@@ -175,7 +175,7 @@ def test_a_twist_drives_again_after_joint_commands(rover: Rover) -> None:
     ("message", "expected"),
     [
         (JointState(name=["jXX"], velocity=[1.0]), "no joint 'jXX'"),
-        (JointState(name=["jFL"], velocity=[1.0, 2.0]), "1 names and 2 values"),
+        (JointState(name=["jFL"], velocity=[1.0, 2.0]), "name has length 1, velocity has 2; give each joint one value"),
         (JointState(name=["jFL"], velocity=[1.0], effort=[1.0]), "give one of position, velocity and effort"),
     ],
     ids=["unknown", "uneven", "both"],

@@ -54,6 +54,6 @@ def _warning(ends: list[Endpoint], session: str) -> str:
         named = [other for other in keys if other.endswith(f"/{end.key}")]
         if named and not on_key(ends, end.key, kind):
             lost.setdefault(text, []).append(end.key)
-            rules += f" -r {end.key}:={min(named)}"
+            rules += f" -r /{end.key}:=/{min(named)}"  # with slashes it holds in any namespace
     what = ", ".join(f"{text} {' and '.join(topics)}" for text, topics in lost.items())
     return rules and f"{what}; a robot with a name has its own: remap with --ros-args{rules}"

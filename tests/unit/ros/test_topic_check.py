@@ -29,7 +29,9 @@ def test_topics_that_only_a_robot_with_a_name_has_are_logged_with_its_own(
 
     nodes = [node("ann", "Fred/"), node("tom", "")]
     (line,) = wait_for(lambda: capfd.readouterr().err.splitlines())
-    rules = "-r cmd_vel:=Fred/cmd_vel -r odom:=Fred/odom -r tf:=Fred/tf"
+    rules = "-r /cmd_vel:=/Fred/cmd_vel -r /odom:=/Fred/odom -r /tf:=/Fred/tf"
     what = "nothing reads cmd_vel, nothing publishes odom and tf; a robot with a name has its own"
     assert line.partition("[tom]: ")[2] == f"{what}: remap with --ros-args {rules}"
     assert len(written) + len(read) + len(nodes) == 7
+    remapped = rclpy.create_node("eve", namespace="lab", cli_args=["--ros-args", *rules.split()])
+    assert remapped.resolve_topic_name("/tf") == "/Fred/tf"
