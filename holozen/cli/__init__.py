@@ -56,7 +56,7 @@ ELSEWHERE = {
     "rviz": _DRAWS, "rviz2": _DRAWS, "rqt": _DRAWS, "foxglove": _DRAWS, "rqt_plot": _DRAWS,
     "pkg": "`holozen new package` writes one; `--package NAME=DIR` gives the folder of a package",
     "control": "the sim moves joints itself, by the key joint_command", "multicast": "write `holozen doctor`",
-    "tf2_echo": "write `holozen tf echo SOURCE TARGET`", "tf2": "write `holozen tf`",
+    **dict.fromkeys(("tf2_echo", "tf_echo"), "write `holozen tf echo SOURCE TARGET`"), "tf2": "write `holozen tf`",
     "spawn_model": "write `holozen spawn`", "spawn_entity": "write `holozen spawn`",
     "spawn_entity.py": "write `holozen spawn`", "gzserver": "write `holozen sim`",
     "check_urdf": "write `holozen check`",
@@ -71,6 +71,7 @@ ELSEWHERE = {
     "rosparam": "write `holozen param`", "rosbag": "write `holozen bag`", "rosrun": "write `holozen run`",
     "roslaunch": "write `holozen launch`", "roscore": "none is needed; `holozen up` starts a robot",
     "call": "write `holozen service call`",
+    **{verb: f"write `holozen sim {verb}`" for verb in ("pause", "play", "step", "reset")},
     **{verb: f"write `holozen topic {verb}`" for verb in ("echo", "pub", "hz", "bw", "delay")},
 }  # fmt: skip
 """Verbs of ROS's tools and other likely guesses, with what to use instead."""

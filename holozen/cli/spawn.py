@@ -157,7 +157,7 @@ def _put_fleet(bus: Bus, candidate: Candidate, place: Place, args: argparse.Name
     if args.json:
         print(*(one.as_json() for one in fleet), sep="\n")
     else:
-        listen = f"listen on {fleet[0].key} .. {fleet[-1].key}" if fleet[0].key else fleet[0].hint or "stand there"
+        listen = f"listen on {fleet[0].key} .. {fleet[-1].key}" if fleet[0].key else fleet[0].hint or "were added"
         print(f"{fleet[0].name} .. {fleet[-1].name} {listen}")
     return 0
 

@@ -29,7 +29,7 @@ def pub(args: argparse.Namespace) -> int:
     """Publish a value once, N times, or until interrupted; a robot that it moved is stopped at the end."""
     args.type, args.value = type_and_value(args, "msg", "VALUE")
     if args.stdin and args.value is not None:
-        args.error(f"{args.key}: {args.value!r} is too much; with --stdin the values come from there")
+        args.error(f"{args.key}: {args.value!r} is one argument too many; with --stdin the values come from there")
     if args.value is None and not (args.type or args.stdin):
         args.error(f"{args.key}: a value is missing; write holozen topic pub {PUB_EXAMPLE}")
     args.no_wait |= args.wait == 0

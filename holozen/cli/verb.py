@@ -201,7 +201,7 @@ def type_and_value(args: argparse.Namespace, kind: str, what: str) -> tuple[str,
     if len(words) == 2 and words[0].isidentifier():
         args.error(f"{args.key}: {words[0]!r} has no package; write a type as geometry_msgs/msg/Twist")
     if len(words) > 1:
-        args.error(f"{args.key}: {words[-1]!r} is too much; write KEY [TYPE] {what}")
+        args.error(f"{args.key}: {words[-1]!r} is one argument too many; write KEY [TYPE] {what}")
     full = given.replace("/", f"/{kind}/") if given.count("/") == 1 else given
     return full, words[0] if words else None
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 HOW = "holozen sim --join --robot FILE=NAME"
-JOIN = f"end it, or join it with named robots: {HOW}"
+JOIN = f"end it, choose another --domain, or join it with named robots: {HOW}"
 
 
 def parser() -> argparse.ArgumentParser:

@@ -133,8 +133,8 @@ def test_a_second_sim_only_joins_with_named_robots_and_then_both_are_one_world_t
 ) -> None:
     first = start_sim(wire, "--robot", f"{BOT}=Fred")
     for words, why in [
-        ([], "end it, or join it with named robots: holozen sim --join --robot FILE=NAME"),
-        (["--robot", f"{BOT}=Ann"], "end it, or join it with named robots: "),
+        ([], "end it, choose another --domain, or join it with named robots: holozen sim --join --robot FILE=NAME"),
+        (["--robot", f"{BOT}=Ann"], "end it, choose another --domain, or join it"),
         (["--join"], "name the robots: holozen sim --join --robot FILE=NAME"),
         (["--join", "--robot", f"{BOT}=Ann", "--robot", str(BOT)], "name the robots: "),
     ]:
