@@ -71,7 +71,8 @@ def _add(entities: Entities, path: Path, name: str, model: RobotModel, y: float)
     keys = [key_for(force.topic, name) for force in model.forces] if pushed else [key_for(drive.command_topic, name)]
     for topic, known in ((drive.command_topic, "cmd_vel"), (drive.odometry_topic, "odom")):
         if topic.rpartition("/")[2] != known:
-            report(f"sim: warning: {path}: topic {topic!r}: the teleop and the controller use {known!r}")
+            how = f"; `holozen teleop --cmd-vel {keys[0]}` drives it" if known == "cmd_vel" and not pushed else ""
+            report(f"sim: warning: {path}: topic {topic!r}: the teleop and the controller use {known!r}{how}")
     return f"{entity.name} listens on {listed(keys)}"
 
 

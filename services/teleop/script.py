@@ -11,7 +11,7 @@ from msgspec import Struct
 
 from holozen.messages import CommandStatus
 from holozen.suggest import listed, suggest
-from holozen.wire import key_for, resume_command
+from holozen.wire import VELOCITIES, resume_command
 
 from .control.layouts import Layout
 from .input.kitty import Key
@@ -99,9 +99,11 @@ def run(steps: list[Step], session: Session, stop: threading.Event) -> str:
 def _nobody(session: Session) -> str:
     """That the robot is not there, and which ones are."""
     missing = session.client.key
-    there = [key for key in (key_for("cmd_vel", robot) for robot in session.ring()) if key != missing]
+    ends = session.graph.endpoints()
+    there = {end.key for end in ends if end.kind == "sub" and end.type in VELOCITIES}
     meant = suggest(missing, there, lambda key: key.rpartition("/")[0])
-    others = f"{meant}; there are some on {listed(there)}"
+    flag = "" if all(key.endswith("cmd_vel") for key in there) else ", which --cmd-vel chooses"
+    others = f"{meant}; there are some on {listed(there)}{flag}"
     return f"no subscriber on {missing}{others if there else '; start a sim in another terminal: holozen sim'}"
 
 

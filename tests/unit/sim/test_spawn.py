@@ -78,7 +78,8 @@ def test_the_plugins_tags_name_the_topics(
     spawn(bus, ground, wanted((file(tmp_path, LINK.format(BALL) + DRIVE.format(tags)), "Fred")))
     assert {"Fred/go", "Fred/where", "Fred/go_status"} <= keys(bus)
     message = capsys.readouterr().err
-    assert f"sim: warning: {tmp_path}/robot.urdf: topic 'go': the teleop and the controller use 'cmd_vel'\n" in message
+    use = "the teleop and the controller use 'cmd_vel'; `holozen teleop --cmd-vel Fred/go` drives it"
+    assert f"sim: warning: {tmp_path}/robot.urdf: topic 'go': {use}\n" in message
     assert f"sim: warning: {tmp_path}/robot.urdf: topic 'where': the teleop and the controller use 'odom'\n" in message
 
 

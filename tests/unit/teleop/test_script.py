@@ -157,6 +157,11 @@ def test_without_its_robot_it_names_those_that_are_there(wire: Wire, commands: S
     assert (done.returncode, done.stderr) == (1, f"teleop: {expected}\n")
     commands.close()
     other.close()
+    other = wire.bus("another").subscribe("demo/my_cmd", Twist)
+    done = wire.run("teleop", "--script", "-", given="1s i")
+    expected = "no subscriber on cmd_vel; there are some on demo/my_cmd, which --cmd-vel chooses"
+    assert (done.returncode, done.stderr) == (1, f"teleop: {expected}\n")
+    other.close()
     done = wire.run("teleop", "--script", "-", given="1s i")
     assert (done.returncode, done.stderr) == (
         1, "teleop: no subscriber on cmd_vel; start a sim in another terminal: holozen sim\n"
