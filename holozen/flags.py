@@ -20,6 +20,7 @@ DRIVES = ("planar_move", "omni")
 DRIVE = "planar_move for a robot whose file has no drive; omni: on its own wheels, instead of planar_move"
 ENGINES = ("pybullet", "mujoco")
 ENGINE = f"the physics engine (default: {ENGINES[0]})"
+NAMED = "--robot FILE=NAME gives a robot's name"
 NEGATIVE = re.compile(r"-\.?\d")  # begins a negative number; argparse itself takes -1e-3 for a flag
 WIDTH = 100  # characters of a line of help where there is no terminal
 

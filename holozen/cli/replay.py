@@ -116,7 +116,7 @@ def _play(
     if args.json:
         print(json.dumps({"messages": player.count, "seconds": round(seconds, 3)}))
     else:
-        print(printable(f"played {player.count} messages in {seconds:.1f} s"))
+        print(printable(f"played {player.count} message{'s' * (player.count != 1)} in {seconds:.1f} s"))
     if ended and not player.count:
         raise Failure("nothing was played" if outlet.left_out else "no message is between --start-offset and --until")
     return int(any(each.refusal for each in feedback))

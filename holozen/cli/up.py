@@ -269,6 +269,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--robot", type=_robot, action="append", default=[], metavar="FILE[=NAME]",
         help="a xacro or URDF file, and the robot's name (default: hb_bot, with its keys at the root);"
         " of several the controller drives the first")  # fmt: skip
+    add("--name", "-model", "-entity", action=flags.Instead, advice=flags.NAMED)
     add("--world", type=flags.file, metavar="FILE", help="an SDF file (default: gazebo.world)")
     add("--rtf", metavar="FACTOR", help="real-time factor; 0: as fast as possible (default: the world's)")
     add("--drive", choices=flags.DRIVES, help=flags.DRIVE)

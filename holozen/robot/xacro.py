@@ -100,7 +100,7 @@ def unasked(path: Path, given: Collection[str], asked: Collection[str] = ()) -> 
     """
     left = sorted(set(asked).difference(given))
     return tuple(
-        f"{path}: nothing asks for the argument {cut(name)}{suggest(name, left)}; its arguments are: {listed(asked)}"
+        f"{path}: there is no argument {cut(name)}{suggest(name, left)}; its arguments are: {listed(asked)}"
         for name in given
         if name not in asked
     )

@@ -64,7 +64,7 @@ def parser() -> argparse.ArgumentParser:
     add("--max-angular", type=flags.number(*inputs.ANGULAR, "rad/s"), default=inputs.MAX_ANGULAR, metavar="RAD/S",
         help="(default: %(default)s)")  # fmt: skip
     for names, advice in (
-        (("--name", "-model", "-entity"), "--robot FILE=NAME gives a robot's name"),
+        (("--name", "-model", "-entity"), flags.NAMED),
         (("--gui", "--headless"), "no sim has a window; `holozen view` shows it in a browser"),
     ):
         add(*names, action=flags.Instead, advice=advice)

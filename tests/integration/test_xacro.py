@@ -122,7 +122,7 @@ def test_an_argument_that_nothing_asks_for_is_a_warning_on_every_save(robot: Pat
     out = robot.with_name("robot.urdf")
     with Process(command("xacro", str(robot), "nmae:=Fred", "--watch", "-o", str(out))) as watcher:
         assert reported(watcher, 2) == f"{robot} expanded, {out} written"
-        assert watcher.err.startswith(f"warning: {robot}: nothing asks for the argument 'nmae'")
+        assert watcher.err.startswith(f"warning: {robot}: there is no argument 'nmae'")
         robot.write_text(robot.read_text().replace("</robot>", '<link name="saved"/></robot>'))
         reported(watcher, 4)
 

@@ -94,12 +94,12 @@ def test_a_call_of_a_macro_without_the_prefix_is_told_to_write_it(findings: Find
 def test_an_argument_that_nothing_asks_for_is_a_finding(findings: Findings, good: str) -> None:
     found = findings(good, args={"size": "1"})
     assert [(finding.rule, finding.place.line) for finding in found] == [("load-note", 0)]
-    assert found[0].problem == "nothing asks for the argument 'size'; its arguments are: none"
+    assert found[0].problem == "there is no argument 'size'; its arguments are: none"
     text = good.replace('<robot name="good">', HEAD).replace("<link ", '<xacro:arg name="size" default="1"/><link ', 1)
     assert findings(text, "r.xacro", args={"size": "1"}) == []
     found = findings(text, "r.xacro", args={"szie": "1"})
     assert [(finding.rule, finding.place.line) for finding in found] == [("load-note", 0)]
-    problem = "nothing asks for the argument 'szie' (did you mean 'size'?); its arguments are: size"
+    problem = "there is no argument 'szie' (did you mean 'size'?); its arguments are: size"
     assert found[0].problem == problem
 
 

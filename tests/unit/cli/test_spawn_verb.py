@@ -136,7 +136,7 @@ def test_a_value_that_the_file_does_not_ask_for_is_a_warning(sim: FakeSim, run: 
     path = ball(tmp_path)
     code, _, err = run("spawn", path, "radius:=2")
     assert (code, list(sim.entities)) == (0, ["ball"])
-    warning = f"{path}: nothing asks for the argument 'radius'; its arguments are: none"
+    warning = f"{path}: there is no argument 'radius'; its arguments are: none"
     assert err == f"holozen spawn: warning: {warning}\n"
 
 

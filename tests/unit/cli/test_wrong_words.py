@@ -20,6 +20,7 @@ def test_a_wrong_word_is_reported_with_the_closest(run: Run) -> None:
         ("sim my.urdf", "holozen sim: unexpected argument 'my.urdf'; a robot's file goes after --robot; "),
         ("sim my.world", "holozen sim: unexpected argument 'my.world'; a world's file goes after --world; "),
         ("sim --robot a.urdf --name Fred", "holozen sim: no flag '--name'; --robot FILE=NAME gives a robot's name; "),
+        ("up --name Fred", "holozen up: no flag '--name'; --robot FILE=NAME gives a robot's name; "),
         ("sim --gui", "holozen sim: no flag '--gui'; no sim has a window; `holozen view` shows it in a browser; "),
         ("tf echo odom base_link Fred", "holozen tf echo: unexpected argument 'Fred'; see `holozen tf echo --help`"),
         ("spawn a.urdf -m Fred", "holozen spawn: no flag '-m' (did you mean '-model'?); "),

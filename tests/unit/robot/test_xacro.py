@@ -127,8 +127,8 @@ def test_an_argument_that_nothing_asks_for_is_a_warning(folder: Path, capsys: py
     for _ in range(2):  # the second text comes from the cache
         expand_xacro(path, {**given, "hieght": "2", "skipped": "x"})
         assert capsys.readouterr().err == (
-            f"warning: {path}: nothing asks for the argument 'hieght' (did you mean 'height'?); {known}\n"
-            f"warning: {path}: nothing asks for the argument 'skipped'; {known}\n"
+            f"warning: {path}: there is no argument 'hieght' (did you mean 'height'?); {known}\n"
+            f"warning: {path}: there is no argument 'skipped'; {known}\n"
         )
 
 
