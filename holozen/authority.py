@@ -42,7 +42,7 @@ class AuthorityError(Failure):
     """A request about the certificates that cannot be met. The text is one line."""
 
 
-def initialize(root: Path, hosts: Sequence[str], days: int) -> None:
+def initialize(root: Path, hosts: Sequence[str], days: float) -> None:
     """Make an authority, a router that is reached at `hosts` and at loopback, and a member of each role."""
     if (root / AUTHORITY).exists():
         raise AuthorityError(f"{root} has an authority already; `holozen secure show` lists its members")
@@ -58,7 +58,7 @@ def initialize(root: Path, hosts: Sequence[str], days: int) -> None:
         add(root, name, name, days, [*HERE, *hosts] if name == ROUTER else [])
 
 
-def add(root: Path, role: str, name: str, days: int, hosts: Sequence[str] = ()) -> None:
+def add(root: Path, role: str, name: str, days: float, hosts: Sequence[str] = ()) -> None:
     """Add a member. A name that was revoked cannot come back: its old certificate would be valid again."""
     table = members(root)
     if not NAME.fullmatch(name):
@@ -103,7 +103,7 @@ def members(root: Path) -> dict[str, Any]:
     return table
 
 
-def _issue(root: Path, name: str, key: Ed25519PublicKey, days: int, hosts: Sequence[str]) -> x509.Certificate:
+def _issue(root: Path, name: str, key: Ed25519PublicKey, days: float, hosts: Sequence[str]) -> x509.Certificate:
     try:
         authority = x509.load_pem_x509_certificate((root / AUTHORITY).read_bytes())
         signer = load_pem_private_key((root / AUTHORITY_KEY).read_bytes(), None)
@@ -121,7 +121,7 @@ def _issue(root: Path, name: str, key: Ed25519PublicKey, days: int, hosts: Seque
     return builder.add_extension(x509.SubjectAlternativeName(names), critical=False).sign(signer, None)
 
 
-def _builder(subject: x509.Name, key: Ed25519PublicKey, days: int) -> x509.CertificateBuilder:
+def _builder(subject: x509.Name, key: Ed25519PublicKey, days: float) -> x509.CertificateBuilder:
     now = datetime.datetime.now(datetime.UTC).replace(microsecond=0)
     begin = now - datetime.timedelta(hours=1)  # for clocks that are slow
     builder = x509.CertificateBuilder().subject_name(subject).public_key(key).not_valid_before(begin)

@@ -1,6 +1,7 @@
 """`holozen router`: a Zenoh router, the meeting point of processes on several machines or in containers."""
 
 import argparse
+import time
 
 from holozen.bus import Bus
 from holozen.cli.verb import Verb, by_name, no_arguments
@@ -12,15 +13,22 @@ from holozen.transport import connection
 def run(args: argparse.Namespace) -> int:
     """Route until Ctrl-C."""
     args.mode = args.mode or "router"
-    where = connection.from_arguments(args)._replace(mode="router")
     stop = stop_event()
     while not stop.is_set():
+        where = connection.from_arguments(args)._replace(mode="router")
         members = _members(where)
         with Bus("router", where, lasting=True) as bus:
             report(f"router: listens at {', '.join(bus.listens)}")
-            while not stop.wait(POLL) and _members(where) == members:
+            while not (stop.wait(POLL) or _has_expired(bus) or _members(where) != members):
                 pass
     return 0
+
+
+def _has_expired(bus: Bus) -> bool:
+    """Whether the router's certificate has expired. It starts again with a new one, or ends: Zenoh closes all links
+    then, but those that are made again within the same second stay, and nobody else gets in to stop a robot.
+    """
+    return bus.member is not None and time.time() > bus.member.expires
 
 
 def _members(where: connection.Connection) -> tuple[int, int]:

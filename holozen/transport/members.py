@@ -8,6 +8,7 @@ command from the router does not see its sender's certificate.
 
 import datetime
 import json
+import math
 import os
 import time
 from pathlib import Path
@@ -28,10 +29,11 @@ SIGNATURE = 128  # hexadecimal digits
 
 
 class Member(NamedTuple):
-    """The member whose certificate and key a folder holds."""
+    """The member whose certificate and key a folder holds. The certificate `expires` then (s, Unix time)."""
 
     name: str
     key: Ed25519PrivateKey
+    expires: float = math.inf
 
     def attachment(self, key: str, priority: str, stamp: bytes, encoding: str, payload: bytes) -> bytes:
         """The stamp and the proof that this member sent it."""
@@ -66,7 +68,7 @@ def load(folder: str) -> Member:
     end = certificate.not_valid_after_utc
     if end < datetime.datetime.now(datetime.UTC):
         raise BusError(f"{path / CERTIFICATE}: the certificate of {name} expired on {end:%Y-%m-%d}")
-    return Member(name, key)
+    return Member(name, key, end.timestamp())
 
 
 def read_members(folder: str) -> dict[str, dict[str, str]]:

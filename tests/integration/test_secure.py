@@ -331,7 +331,11 @@ def test_a_service_cannot_be_taken_over(fleet: Fleet, robot: Robot) -> None:
         robot.bus.call("release", TriggerRequest(), TriggerReply)
 
 
-def test_without_a_certificate_no_node_gets_in(fleet: Fleet) -> None:
+def test_without_a_valid_certificate_no_node_gets_in_and_no_router_goes_on(fleet: Fleet, tmp_path: Path) -> None:
+    authority.initialize(tmp_path / "brief", [], 8 / 86_400)
+    listen = ("--listen", f"tls/127.0.0.1:{free_port()}")
+    router = fleet.run(*command("router", *listen, "--secure", str(tmp_path / "brief")))
+    router.wait_for_line("router: listens at")
     for kind, tls in (("tls", {"root_ca_certificate": str(fleet.root / "ca.pem")}), ("tcp", {})):
         config = zenoh.Config()
         endpoint = fleet.endpoint.replace("tls/", f"{kind}/")
@@ -343,6 +347,8 @@ def test_without_a_certificate_no_node_gets_in(fleet: Fleet) -> None:
             config.insert_json5(path, value)
         with pytest.raises(zenoh.ZError, match="Unable to connect"):
             zenoh.open(config)
+    assert router.wait(30) == 2, router.err
+    assert "the certificate of router expired on" in router.err and router.err.count("\n") == 2, router.err
 
 
 def test_a_certificate_of_another_authority_is_refused_in_one_line(fleet: Fleet, tmp_path: Path) -> None:
