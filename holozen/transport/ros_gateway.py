@@ -40,7 +40,7 @@ from holozen.transport import rmw_zenoh as rmw
 from holozen.transport.connection import Connection
 from holozen.transport.errors import BusError, ServiceError
 from holozen.transport.samples import Answers, RawSubscriber, Sample, stamps
-from holozen.transport.services import MAX_REQUEST_BYTES, RING, call_bytes, refuse
+from holozen.transport.services import MAX_REQUEST_BYTES, RING, call_bytes, frees, refuse
 from holozen.transport.session import close, configuration, new_id, one_line
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ UNKNOWN_AGE = (
 )
 LATE = (
     f"it was sent more than {wire.COMMAND_SILENCE:g} s from this machine's clock: it is late, and has to be sent again,"
-    " or the clocks differ: set them, or use `holozen release`, `controller --resume` or `action send_goal`"
+    " or the clocks differ: set them, or use `holozen release`, `controller --resume`, `sim play` or `action send_goal`"
 )
 FAILED = 4  # OPERATION_FAILED of simulation_interfaces/msg/Result
 SHARED = ("tf", "tf_static")  # topics with several publishers by nature
@@ -435,9 +435,10 @@ class Gateway:
         request = f"application/cdr;{interface.request.name}"
         try:
             is_late = stamp and abs(time.time() - stamp.sent / 1e9) > wire.COMMAND_SILENCE
-            if is_late and found.topic.rpartition("/")[2] in wire.FREEING:
+            payload = bytes(query.payload or b"")
+            if is_late and frees(found.topic, payload, request):
                 raise ServiceError(LATE)
-            reply = self._replied(found.topic, bytes(query.payload or b""), request)
+            reply = self._replied(found.topic, payload, request)
             payload = codec.transcoded(interface.response, reply.payload, reply.encoding)
         except ServiceError as error:
             # A client of ROS 2 ignores an error reply, and would wait for ever.

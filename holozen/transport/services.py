@@ -23,6 +23,7 @@ from holozen.transport.samples import (
     source_in,
     until_closed,
 )
+from holozen.wire import FREEING
 
 if TYPE_CHECKING:
     from holozen.messages import Message
@@ -52,6 +53,21 @@ def refusal(payload: bytes) -> ServiceError:
         return ServiceError(str(fields.pop("error")), **fields)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return ServiceError(text or "the service answered with an error and no reason")
+
+
+def frees(key: str, payload: bytes, encoding: str) -> bool:
+    """Whether a request lets a robot move, so that it must not be late. One that pauses the sim counts at any age."""
+    name = key.rpartition("/")[2]
+    if name != "set_simulation_state":
+        return name in FREEING
+    from holozen.messages import codec
+    from holozen.messages.simulation_interfaces import SetSimulationStateRequest, SimulationState
+
+    try:
+        state = codec.decode(payload, encoding, (SetSimulationStateRequest,)).state.state
+    except codec.CodecError:  # it is refused later
+        return False
+    return state == SimulationState.STATE_PLAYING
 
 
 class Doubt(NamedTuple):

@@ -31,8 +31,8 @@ from holozen.messages.definitions import Interface, InterfaceError, whole_text
 from holozen.messages.registry import Registry
 from holozen.transport.graph import Endpoint
 from holozen.transport.samples import RawSubscriber
-from holozen.transport.services import call_bytes
-from holozen.wire import FREEING, PRIORITY_OF, is_command, stop
+from holozen.transport.services import call_bytes, frees
+from holozen.wire import PRIORITY_OF, is_command, stop
 
 from .guard import Guard, TimedConnection
 
@@ -56,7 +56,7 @@ class Relay:
 
     def __init__(self, guard: Guard, host: str, port: int, inner: int, secret: str) -> None:
         self._guard, self._inner, self._secret = guard, f"ws://127.0.0.1:{inner}", secret
-        self._freeing = set[bytes]()  # the numbers of services, as they are in a call
+        self._services = dict[bytes, str]()  # by their numbers, as they are in a call
         guard.moves = self._moves
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
@@ -95,13 +95,16 @@ class Relay:
             async for message in server:
                 if isinstance(message, str) and '"advertiseServices"' in message:
                     for one in json.loads(message)["services"]:
-                        if one["name"].rpartition("/")[2] in FREEING:
-                            self._freeing.add(one["id"].to_bytes(4, "little"))
+                        self._services[one["id"].to_bytes(4, "little")] = one["name"]
                 await client.send(message)
 
     def _moves(self, data: bytes) -> bool:
         """Whether a client's frame publishes a message, which moves a robot if it is a command, or lets one move."""
-        return data[:1] == MESSAGE or (data[:1] == CALL_OF and data[1:5] in self._freeing)
+        if data[:1] != CALL_OF:
+            return data[:1] == MESSAGE
+        payload = 13 + int.from_bytes(data[9:13], "little")  # after the number of the call, and the encoding
+        encoding = "application/cdr" if data[13:payload] == b"cdr" else "application/json"  # as in Server._call
+        return frees(self._services.get(data[1:5], ""), data[payload:], encoding)
 
     def close(self) -> None:
         """Disconnect all clients, and end."""

@@ -14,13 +14,15 @@ from websockets.exceptions import InvalidStatus
 from websockets.typing import Subprotocol
 
 from holozen.messages import CommandStatus, JointState, Odometry, TriggerReply, TriggerRequest, Twist, codec
+from holozen.messages import simulation_interfaces as si
 from holozen.testing import Process, Wire, wait_for
 from tests.faults.proxy import Proxy
 
 from .robots import record
 
 TOKEN = "sesame"
-EMPTY = b"\0\1\0\0\0"  # a Trigger's request in CDR
+EMPTY, PLAY = b"\0\1\0\0\0", b"\0\1\0\0\1"  # requests of a Trigger and of set_simulation_state in CDR
+PAUSED = si.SimulationState.STATE_PAUSED
 TURN = 0.5  # s, of services.view.foxglove_server
 MESSAGE, SERVICE_RESPONSE = 1, 3  # the first byte of what the server sends in binary
 
@@ -192,17 +194,27 @@ def test_joints_stop_when_the_connection_ends(wire: Wire, view: Callable[..., st
     wait_for(lambda: commands.messages()[-1] == JointState(name=["a"], velocity=[0.0]), what="the stop")
 
 
-def test_a_release_that_waited_in_a_link_does_not_end_a_stop_from_after_it(
+def test_a_release_or_a_play_that_waited_in_a_link_does_not_end_a_stop_or_a_pause_from_after_it(
     wire: Wire, view: Callable[..., str]
 ) -> None:
+    def pause() -> None:
+        request = si.SetSimulationStateRequest(si.SimulationState(PAUSED))
+        bus.call("set_simulation_state", request, si.SetSimulationStateReply)
+
+    def is_paused() -> bool:
+        reply = bus.call("get_simulation_state", si.GetSimulationStateRequest(), si.GetSimulationStateReply)
+        return reply.state.state == PAUSED
+
     async def late(link: Proxy, address: str) -> None:
         async with client(address) as foxglove:
             services = foxglove.services
-            await foxglove.until(lambda: {"/stop", "/release"} <= services.keys())
+            await foxglove.until(lambda: {"/stop", "/release", "/set_simulation_state"} <= services.keys())
             await foxglove.call(services["/stop"]["id"], EMPTY)
             await foxglove.until(lambda: foxglove.replies)
             link.stall()
             await foxglove.call(services["/release"]["id"], EMPTY)
+            await foxglove.call(services["/set_simulation_state"]["id"], PLAY)
+            await asyncio.to_thread(pause)
             for verb in ("release", "stop"):
                 await asyncio.to_thread(bus.call, verb, TriggerRequest(), TriggerReply)
             seen = odom.count
@@ -211,6 +223,10 @@ def test_a_release_that_waited_in_a_link_does_not_end_a_stop_from_after_it(
             assert await asyncio.to_thread(odom.wait, odom.count + 25, 5), "half a second later"
             again = await asyncio.to_thread(wire.bus().call, "stop", TriggerRequest(), TriggerReply)
             assert again.message.startswith(f"stopped by {bus.source}")
+            assert await asyncio.to_thread(is_paused)
+            await foxglove.call(services["/set_simulation_state"]["id"], PLAY)  # a prompt one counts
+            await foxglove.until(lambda: len(foxglove.replies) > 1)
+            assert not await asyncio.to_thread(is_paused)
 
     where, bus = urlsplit(view()), wire.bus("watcher")
     odom = bus.latest("odom", Odometry)

@@ -223,7 +223,7 @@ def test_a_command_that_waited_on_its_way_is_left_out(wire: Wire, theirs: "Their
     assert 0.2 not in later
 
 
-def test_a_release_that_waited_on_its_way_ends_no_stop(wire: Wire, theirs: "Theirs") -> None:
+def test_a_release_or_play_that_waited_on_its_way_ends_no_stop_or_pause(wire: Wire, theirs: "Theirs") -> None:
     wire.start("sim").wait_for_line("listens on cmd_vel", 60)
     joined(wire)
     wire.bus().call("stop", TriggerRequest(), TriggerReply)
@@ -240,6 +240,10 @@ def test_a_release_that_waited_on_its_way_ends_no_stop(wire: Wire, theirs: "Thei
     assert (late.success, late.message[:40]) == (False, "it was sent more than 0.5 s from this ma")
     assert wire.bus("other").call("stop", TriggerRequest(), TriggerReply).message.startswith("stopped by test@")
     wait_for(lambda: asked(time.time()).success, what="a release of now to count")
+    play = {"payload": b"\0\1\0\0\1", "attachment": sample(1, time.time() - 1.0).packed()}
+    session = wire.bus("theirs").session
+    reply, *_ = wait_for(lambda: list(session.get("0/set_simulation_state/**", **play)), what="our service")
+    assert b"it was sent more than 0.5 s" in reply.ok.payload.to_bytes()
 
 
 def test_first_commands_that_waited_are_left_out_until_their_publisher_keeps_pace(wire: Wire, theirs: "Theirs") -> None:
