@@ -34,7 +34,7 @@ from holozen.transport.samples import RawSubscriber
 from holozen.transport.services import call_bytes, frees
 from holozen.wire import PRIORITY_OF, is_command, stop
 
-from .guard import Guard, TimedConnection
+from .guard import MAX_AGE, Guard, TimedConnection
 
 PROTOCOL = Subprotocol("foxglove.sdk.v1")
 OLDER = Subprotocol("foxglove.websocket.v1")  # the same by another name, which older clients ask for
@@ -42,6 +42,7 @@ MESSAGE, CALL_OF = b"\x01", b"\x02"  # the first bytes of frames in which a clie
 LOOK_EVERY, DRAIN_EVERY = 0.5, 0.01  # s; how often the graph is read, and the topics are
 DEPTH = 64  # messages of a topic that wait
 CALL = 5.0  # s for a service
+DATE = 8  # bytes after a client's message, see Guard
 LARGEST = 16_000_000  # bytes that a client may send at once
 MAX_STOPS = 64  # of a channel: one for each set of joints that a client names
 TURN = 0.5  # s without a motion command by the client that drives a robot, after which another one may drive
@@ -57,7 +58,7 @@ class Relay:
     def __init__(self, guard: Guard, host: str, port: int, inner: int, secret: str) -> None:
         self._guard, self._inner, self._secret = guard, f"ws://127.0.0.1:{inner}", secret
         self._services = dict[bytes, str]()  # by their numbers, as they are in a call
-        guard.moves = self._moves
+        guard.moves, guard.dates = self._moves, lambda data: data[:1] == MESSAGE
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
@@ -99,9 +100,9 @@ class Relay:
                 await client.send(message)
 
     def _moves(self, data: bytes) -> bool:
-        """Whether a client's frame publishes a message, which moves a robot if it is a command, or lets one move."""
+        """Whether a client's frame calls a service that lets a robot move. Messages have a date instead."""
         if data[:1] != CALL_OF:
-            return data[:1] == MESSAGE
+            return False
         payload = 13 + int.from_bytes(data[9:13], "little")  # after the number of the call, and the encoding
         encoding = "application/cdr" if data[13:payload] == b"cdr" else "application/json"  # as in Server._call
         return frees(self._services.get(data[1:5], ""), data[payload:], encoding)
@@ -224,8 +225,11 @@ class Commands:
                 raise ValueError("the view ends, and publishes no more")
             self._open[client, channel.id] = self._bus.publisher(key, kind, priority), kind, encoding, []
 
-    def put(self, client: int, channel: int, data: bytes) -> None:
-        """Publish a client's message. Raises ValueError if it is malformed, or while another client drives."""
+    def put(self, client: int, channel: int, data: bytes, sent: float) -> None:
+        """Publish a client's message that was sent at `sent` (s, monotonic) or later. Raises ValueError if it is
+        malformed, while another client drives, or if it may be older than MAX_AGE and is no stop: it waited in a link,
+        or in this process, which may have been suspended.
+        """
         with self._lock:
             if not (found := self._open.get((client, channel))):
                 return
@@ -233,7 +237,10 @@ class Commands:
             key = str(publisher.key)
             try:
                 message = codec.decode(data, encoding, (kind,))
-                if is_command(key, (kind.ROS,)) and kind is not PoseStamped:  # to a goal the controller drives
+                drives = is_command(key, (kind.ROS,)) and kind is not PoseStamped  # to a goal the controller drives
+                if time.monotonic() - sent > MAX_AGE and (_moves(message) or not drives):
+                    raise ValueError(f"/{key}: this may have been sent more than {MAX_AGE:g} s ago; send it again")
+                if drives:
                     self._take_turn(key, client, message)
                     fields = stop(message, kind.ROS)
                     if fields is not None and (stopped := kind(**fields)) not in stops:
@@ -372,7 +379,8 @@ class Server(ServerListener):
         """A client publishes a message."""
         if client.id in self._vouched:
             with self._reporting_errors():
-                self._commands.put(client.id, client_channel_id, data)
+                sent = int.from_bytes(data[-DATE:], "little") * 1e-9
+                self._commands.put(client.id, client_channel_id, data[:-DATE], sent)
 
     def on_get_parameters(
         self, client: Any, param_names: list[str], request_id: str | None = None

@@ -43,13 +43,15 @@ def moves(data: bytes) -> bool:
 class Guard:
     """Refuses requests without the `token` (unless that is empty), from pages of other web sites, and for other hosts.
 
-    `moves` tells whether the data of a frame may move a robot. `apps`: pages of other web sites may connect if they
+    `moves` tells whether the data of a frame may move a robot, and `dates` whether it gets, as its last 8 bytes, the
+    time (ns, monotonic, little-endian) since which it was sent. `apps`: pages of other web sites may connect if they
     have the token.
     """
 
     def __init__(self, token: str, apps: bool = False) -> None:
         self._token, self._apps = token, apps
         self.moves: Callable[[bytes], bool] = moves
+        self.dates: Callable[[bytes], bool] = lambda _: False
         self.quiet = logging.getLogger("holozen.view")  # each refused request would be a traceback
         self.quiet.setLevel(logging.CRITICAL)
         self.installed = False
@@ -134,11 +136,12 @@ class TimedConnection(websockets.ServerConnection):
             if event.opcode is Opcode.PONG and bytes(event.data) in self.pending_pings:
                 with contextlib.suppress(ValueError):  # the library's own pings hold no time
                     self._answered = max(self._answered, int(bytes(event.data), 16) * 1e-9)
-            if event.opcode in DATA_OPCODES and now - self._answered > MAX_AGE:
-                data = bytes(event.data)
-                if self._guard.moves(data):
-                    self._guard.late_at = now
-                    return
+            data = bytes(event.data) if event.opcode in DATA_OPCODES else b""
+            if self._guard.dates(data):
+                event.data = data + int(self._answered * 1e9).to_bytes(8, "little")
+            elif now - self._answered > MAX_AGE and self._guard.moves(data):
+                self._guard.late_at = now
+                return
         super().process_event(event)
 
 

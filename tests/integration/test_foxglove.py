@@ -194,7 +194,7 @@ def test_joints_stop_when_the_connection_ends(wire: Wire, view: Callable[..., st
     wait_for(lambda: commands.messages()[-1] == JointState(name=["a"], velocity=[0.0]), what="the stop")
 
 
-def test_a_release_or_a_play_that_waited_in_a_link_does_not_end_a_stop_or_a_pause_from_after_it(
+def test_what_waited_in_a_link_moves_nothing_and_ends_no_stop_or_pause_from_after_it_but_a_stop_counts(
     wire: Wire, view: Callable[..., str]
 ) -> None:
     def pause() -> None:
@@ -211,7 +211,14 @@ def test_a_release_or_a_play_that_waited_in_a_link_does_not_end_a_stop_or_a_paus
             await foxglove.until(lambda: {"/stop", "/release", "/set_simulation_state"} <= services.keys())
             await foxglove.call(services["/stop"]["id"], EMPTY)
             await foxglove.until(lambda: foxglove.replies)
+            channel = {"id": 7, "topic": "/cmd_vel", "encoding": "json", "schemaName": Twist.ROS}
+            await foxglove.send(op="advertise", channels=[channel])
+            while not commands.messages():
+                await foxglove.publish(7, b'{"linear": {"x": 0.1}}')
+                await asyncio.sleep(0.1)
             link.stall()
+            await foxglove.publish(7, b'{"linear": {"x": 0.2}}')
+            await foxglove.publish(7, b"{}")
             await foxglove.call(services["/release"]["id"], EMPTY)
             await foxglove.call(services["/set_simulation_state"]["id"], PLAY)
             await asyncio.to_thread(pause)
@@ -223,13 +230,15 @@ def test_a_release_or_a_play_that_waited_in_a_link_does_not_end_a_stop_or_a_paus
             assert await asyncio.to_thread(odom.wait, odom.count + 25, 5), "half a second later"
             again = await asyncio.to_thread(wire.bus().call, "stop", TriggerRequest(), TriggerReply)
             assert again.message.startswith(f"stopped by {bus.source}")
+            sent = [one.linear.x for one in commands.messages()]
+            assert (0.2 in sent, sent[-1]) == (False, 0.0), "the late motion does not count, the late stop does"
             assert await asyncio.to_thread(is_paused)
             await foxglove.call(services["/set_simulation_state"]["id"], PLAY)  # a prompt one counts
             await foxglove.until(lambda: len(foxglove.replies) > 1)
             assert not await asyncio.to_thread(is_paused)
 
     where, bus = urlsplit(view()), wire.bus("watcher")
-    odom = bus.latest("odom", Odometry)
+    odom, commands = bus.latest("odom", Odometry), record(bus, "cmd_vel", Twist)
     with Proxy(where.port or 0) as link:
         asyncio.run(late(link, where._replace(netloc=f"127.0.0.1:{link.port}").geturl()))
 

@@ -1,5 +1,6 @@
 """Foxglove's clients take turns at a robot."""
 
+import time
 from types import SimpleNamespace
 from typing import Any
 
@@ -43,9 +44,9 @@ def test_whoever_drives_a_robot_also_has_its_joints(wire: Wire, command: bytes) 
     commands = Commands(view, view.endpoints)
     commands.open(A, channel("cmd_vel", Twist))
     commands.open(B, channel("joint_command", JointState))
-    commands.put(A, 7, b'{"linear": {"x": 0.3}}')
+    commands.put(A, 7, b'{"linear": {"x": 0.3}}', time.monotonic())
     with pytest.raises(ValueError, match=r"^/joint_command: somebody else drives"):
-        commands.put(B, 7, command)
+        commands.put(B, 7, command, time.monotonic())
     commands.halt()
 
 
