@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 
 HOW = "holozen sim --join --robot FILE=NAME"
+DISCOVERY = 0.5  # s for the sim that this one joins
 JOIN = f"end it, choose another --domain, or join it with named robots: {HOW}"
 
 
@@ -100,6 +101,8 @@ def main(argv: list[str] | None = None) -> int:
             from .physics.world import World
             from .spawn import add_models, spawn_all
 
+            if args.join:  # the tokens of the other one may still be on their way; without it, this is the first sim
+                graph.settled(bus.connected, max(DISCOVERY, bus.took))
             other = _other_sim(graph, mine)
             joins = bool(other) or (mine is not None and mine.number != 1)
             graph.close()

@@ -7,7 +7,9 @@ import pytest
 
 from holozen import data
 from holozen.messages import JointState, TFMessage
-from holozen.testing import Wire, wait_for
+from holozen.testing import Process, Wire, wait_for
+from holozen.testing.wire import command
+from tests.faults.proxy import Proxy
 
 from .conftest import Verb, start_sim
 from .processes import assert_one_line
@@ -131,6 +133,7 @@ def test_a_sim_that_cannot_start_gives_the_reason_in_one_line(
 def test_a_second_sim_only_joins_with_named_robots_and_then_both_are_one_world_to_callers(
     verb: Verb, wire: Wire
 ) -> None:
+    wire.start("router").wait_for_line("listens at")
     first = start_sim(wire, "--robot", f"{BOT}=Fred")
     for words, why in [
         ([], "end it, choose another --domain, or join it with named robots: holozen sim --join --robot FILE=NAME"),
@@ -140,8 +143,18 @@ def test_a_second_sim_only_joins_with_named_robots_and_then_both_are_one_world_t
     ]:
         done = wire.run("sim", *words)
         assert_one_line(done, 1, "sim: sim@", f" simulates here already; {why}")
-    second = start_sim(wire, "--join", "--robot", f"{BOT}=Ann")
-    assert [line.split()[0] for line in verb(wire, "list").stdout.splitlines()] == ["Ann", "Fred"]
+    with Proxy(wire.port) as link:  # a slow one: what it joins is discovered late
+        link.set(delay=0.2)
+        where = ("--mode", "client", "--connect", link.endpoint)
+        with Process(command("sim", "--join", "--robot", f"{BOT}=Ann", *where)) as second:
+            second.wait_for_line("Ann listens on")
+            link.set(delay=0.0)
+            assert_both_are_one_world(verb, wire)
+    assert "Traceback" not in first.err + second.err
+
+
+def assert_both_are_one_world(verb: Verb, wire: Wire) -> None:
+    wait_for(lambda: [line.split()[0] for line in verb(wire, "list").stdout.splitlines()] == ["Ann", "Fred"])
     clock = json.loads(verb(wire, "topic", "info", "clock", "--json").stdout)
     assert len(clock["publishers"]) == 1
     assert "duplicates" not in verb(wire, "doctor").stdout
@@ -150,4 +163,3 @@ def test_a_second_sim_only_joins_with_named_robots_and_then_both_are_one_world_t
     assert verb(wire, "delete", "Ann", "Fred").returncode == 0
     assert verb(wire, "list").stdout == ""
     assert verb(wire, "spawn", str(BOT), "--name", "Joe").returncode == 0, "one of them spawns"
-    assert "Traceback" not in first.err + second.err
