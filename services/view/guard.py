@@ -121,6 +121,7 @@ class TimedConnection(websockets.ServerConnection):
     def __init__(self, guard: Guard, *parts: Any, **options: Any) -> None:
         super().__init__(*parts, **options)
         self._guard, self._answered = guard, time.monotonic()
+        self._date = b""  # of the message that arrives; empty if it gets none
 
     async def ping_often(self) -> None:
         """Send pings for as long as the connection lasts."""
@@ -136,13 +137,20 @@ class TimedConnection(websockets.ServerConnection):
             if event.opcode is Opcode.PONG and bytes(event.data) in self.pending_pings:
                 with contextlib.suppress(ValueError):  # the library's own pings hold no time
                     self._answered = max(self._answered, int(bytes(event.data), 16) * 1e-9)
-            data = bytes(event.data) if event.opcode in DATA_OPCODES else b""
-            if self._guard.dates(data):
-                event.data = data + int(self._answered * 1e9).to_bytes(8, "little")
-            elif now - self._answered > MAX_AGE and self._guard.moves(data):
-                self._guard.late_at = now
+            if event.opcode in DATA_OPCODES and not self._counts(event, now):
                 return
         super().process_event(event)
+
+    def _counts(self, frame: Frame, now: float) -> bool:
+        """Whether a frame of data counts. The date of its message goes after the last frame."""
+        if frame.opcode is not Opcode.CONT:
+            self._date = int(self._answered * 1e9).to_bytes(8, "little") if self._guard.dates(bytes(frame.data)) else b""
+        if self._date:
+            frame.data = bytes(frame.data) + self._date * frame.fin
+        elif now - self._answered > MAX_AGE and self._guard.moves(bytes(frame.data)):
+            self._guard.late_at = now
+            return False
+        return True
 
 
 def is_loopback(host: str) -> bool:

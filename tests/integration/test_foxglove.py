@@ -66,8 +66,9 @@ class Client:
     async def send(self, **fields: Any) -> None:
         await self._connection.send(json.dumps(fields))
 
-    async def publish(self, channel: int, payload: bytes) -> None:
-        await self._connection.send(struct.pack("<BI", 1, channel) + payload)
+    async def publish(self, channel: int, payload: bytes, in_frames: bool = False) -> None:
+        head = struct.pack("<BI", 1, channel)
+        await self._connection.send([head, payload, b""] if in_frames else head + payload)
 
     async def call(self, service: int, payload: bytes) -> None:
         await self._connection.send(struct.pack("<BIII", 2, service, 1, 3) + b"cdr" + payload)
@@ -141,7 +142,7 @@ def test_a_person_drives_and_the_robot_stops_when_the_connection_ends(wire: Wire
             await foxglove.publish(7, b'{"linear": {"x": "fast"}}')
             await foxglove.until(lambda: any("/cmd_vel" in text for text in foxglove.statuses))
             while not moves():
-                await foxglove.publish(7, json.dumps({"linear": {"x": 0.3}}).encode())
+                await foxglove.publish(7, json.dumps({"linear": {"x": 0.3}}).encode(), in_frames=True)
                 await asyncio.sleep(0.05)
             async with client(address) as other:
                 await other.send(op="advertise", channels=channels[:1])
