@@ -67,7 +67,7 @@ def add(root: Path, role: str, name: str, days: float, hosts: Sequence[str] = ()
         was = "was revoked" if name in table["revoked"] else "is a member already"
         raise AuthorityError(f"{name} {was}; choose another name")
     key = Ed25519PrivateKey.generate()
-    certificate = _issue(root, name, key.public_key(), days, hosts)
+    certificate = _issue(root, name, key.public_key(), days, [_host(host) for host in hosts])
     folder = root / name
     folder.mkdir(mode=0o700, exist_ok=True)
     _write_key(folder / KEY, key)
@@ -81,11 +81,25 @@ def add(root: Path, role: str, name: str, days: float, hosts: Sequence[str] = ()
     _write_members(root, table)
 
 
+def renew(root: Path, names: Sequence[str], days: float) -> None:
+    """Issue new certificates, for the same keys, to these members, or to all if there are no `names`."""
+    table = members(root)
+    for name, row in {name: _member(table, name) for name in names or table["members"]}.items():
+        file, hosts = root / name / CERTIFICATE, []
+        if row["role"] == ROUTER:
+            old = x509.load_pem_x509_certificate(file.read_bytes())
+            hosts = list(old.extensions.get_extension_for_class(x509.SubjectAlternativeName).value)
+        certificate = _issue(root, name, Ed25519PublicKey.from_public_bytes(bytes.fromhex(row["key"])), days, hosts)
+        file.parent.mkdir(mode=0o700, exist_ok=True)  # it may have been moved to the member's machine
+        _write(file, certificate.public_bytes(Encoding.PEM))
+        row["expires"] = certificate.not_valid_after_utc.isoformat()
+    _write_members(root, table)
+
+
 def revoke(root: Path, name: str) -> None:
     """Remove a member: the router allows it nothing, and the sim refuses its commands."""
     table = members(root)
-    if name not in table["members"]:
-        raise AuthorityError(f"there is no member {name!r}; there are: {', '.join(table['members'])}")
+    _member(table, name)
     del table["members"][name]
     table["revoked"].append(name)
     _write_members(root, table)
@@ -103,7 +117,17 @@ def members(root: Path) -> dict[str, Any]:
     return table
 
 
-def _issue(root: Path, name: str, key: Ed25519PublicKey, days: float, hosts: Sequence[str]) -> x509.Certificate:
+def _member(table: dict[str, Any], name: str) -> dict[str, str]:
+    """The row of a member."""
+    row: dict[str, str] | None = table["members"].get(name)
+    if row is None:
+        raise AuthorityError(f"there is no member {name!r}; there are: {', '.join(table['members'])}")
+    return row
+
+
+def _issue(
+    root: Path, name: str, key: Ed25519PublicKey, days: float, hosts: Sequence[x509.GeneralName]
+) -> x509.Certificate:
     try:
         authority = x509.load_pem_x509_certificate((root / AUTHORITY).read_bytes())
         signer = load_pem_private_key((root / AUTHORITY_KEY).read_bytes(), None)
@@ -117,7 +141,7 @@ def _issue(root: Path, name: str, key: Ed25519PublicKey, days: float, hosts: Seq
     builder = _builder(_name(name), key, days).issuer_name(authority.subject)
     builder = builder.add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
     builder = builder.add_extension(x509.ExtendedKeyUsage([use]), critical=True)
-    names = [_host(host) for host in hosts] or [x509.DNSName(name)]
+    names = hosts or [x509.DNSName(name)]
     return builder.add_extension(x509.SubjectAlternativeName(names), critical=False).sign(signer, None)
 
 

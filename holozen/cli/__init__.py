@@ -22,7 +22,7 @@ VERBS = {
     "pose-service": "answer next_goal and get_pose",
     "router": "run a Zenoh router",
     "ros2": "join ROS 2 nodes, by rmw_zenoh or a bridge to DDS",
-    "secure": "init, add, revoke, show",
+    "secure": "init, add, renew, revoke, show",
     "run": "run a Python script that was written for ROS 2",
     "launch": "run a Python launch file that was written for ROS 2",
     "spawn": "put a robot or object into the running sim",

@@ -1,4 +1,4 @@
-"""`holozen secure`: makes, revokes and shows the certificates of the secure set-up."""
+"""`holozen secure`: makes, renews, revokes and shows the certificates of the secure set-up."""
 
 import argparse
 import json
@@ -25,6 +25,11 @@ def _init(authority: Any, root: Path, args: argparse.Namespace) -> str:
 def _add(authority: Any, root: Path, args: argparse.Namespace) -> str:
     authority.add(root, args.role, args.name, args.days)
     return f"{root / args.name}: copy it to where {args.name} works, and keep it secret"
+
+
+def _renew(authority: Any, root: Path, args: argparse.Namespace) -> str:
+    authority.renew(root, args.names, args.days)
+    return f"{root}: new certificates; where members work elsewhere, copy the new cert.pem of each there"
 
 
 def _revoke(authority: Any, root: Path, args: argparse.Namespace) -> str:
@@ -72,18 +77,21 @@ def _arguments(verb: str) -> Callable[[argparse.ArgumentParser], None]:
             add("role", choices=ROLES)
         if verb in ("add", "revoke"):
             add("name")
-        if verb in ("init", "add"):
+        if verb == "renew":
+            add("names", nargs="*", metavar="NAME", help="a member (default: all)")
+        if verb in ("init", "add", "renew"):
             add("--days", type=count(1, 3650), default=DAYS, help=f"until certificates expire (default: {DAYS})")
 
     return fill
 
 
 VERBS = by_name(
-    Noun("secure", "make and revoke the certificates of a network's members"),
+    Noun("secure", "make, renew and revoke the certificates of a network's members"),
     *(Verb(f"secure {name}", about, example, _arguments(name), _run(act), bus=False)
     for name, about, example, act in (
         ("init", "make an authority, a router and a member of each role", "--host robot.local", _init),
         ("add", "add a member", "operator Ann", _add),
+        ("renew", "issue new certificates to members, for the keys they have", "Ann", _renew),
         ("revoke", "remove a member; the router starts anew without it", "Ann", _revoke),
         ("show", "list the members, their roles and when their certificates expire", "", _show),
     ))

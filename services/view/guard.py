@@ -144,7 +144,9 @@ class TimedConnection(websockets.ServerConnection):
     def _counts(self, frame: Frame, now: float) -> bool:
         """Whether a frame of data counts. The date of its message goes after the last frame."""
         if frame.opcode is not Opcode.CONT:
-            self._date = int(self._answered * 1e9).to_bytes(8, "little") if self._guard.dates(bytes(frame.data)) else b""
+            self._date = (
+                int(self._answered * 1e9).to_bytes(8, "little") if self._guard.dates(bytes(frame.data)) else b""
+            )
         if self._date:
             frame.data = bytes(frame.data) + self._date * frame.fin
         elif now - self._answered > MAX_AGE and self._guard.moves(bytes(frame.data)):

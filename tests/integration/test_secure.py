@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import pytest
 import zenoh
+from cryptography import x509
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 from holozen import authority, cli, entities
@@ -336,6 +337,7 @@ def test_without_a_valid_certificate_no_node_gets_in_and_no_router_goes_on(fleet
     listen = ("--listen", f"tls/127.0.0.1:{free_port()}")
     router = fleet.run(*command("router", *listen, "--secure", str(tmp_path / "brief")))
     router.wait_for_line("router: listens at")
+    authority.renew(tmp_path / "brief", ["router", "viewer"], 1)
     for kind, tls in (("tls", {"root_ca_certificate": str(fleet.root / "ca.pem")}), ("tcp", {})):
         config = zenoh.Config()
         endpoint = fleet.endpoint.replace("tls/", f"{kind}/")
@@ -347,8 +349,21 @@ def test_without_a_valid_certificate_no_node_gets_in_and_no_router_goes_on(fleet
             config.insert_json5(path, value)
         with pytest.raises(zenoh.ZError, match="Unable to connect"):
             zenoh.open(config)
+
+    def is_out(name: str) -> bool:
+        try:
+            with Bus("test", Connection("client", connect=listen[1:], secure=str(tmp_path / "brief" / name))) as bus:
+                return not bus.id
+        except BusError as error:
+            return "certificate expired" in str(error)
+
+    wait_for(lambda: is_out("operator"))
+    assert not is_out("viewer")
+    authority.renew(tmp_path / "brief", ["router"], 3 / 86_400)
     assert router.wait(30) == 2, router.err
-    assert "the certificate of router expired on" in router.err and router.err.count("\n") == 2, router.err
+    listens = f"router: listens at {listen[1]}"
+    assert router.err.splitlines()[:-1] == 3 * [listens], router.err
+    assert "the certificate of router expired on" in router.err.splitlines()[-1]
 
 
 def test_a_certificate_of_another_authority_is_refused_in_one_line(fleet: Fleet, tmp_path: Path) -> None:
@@ -486,7 +501,7 @@ def test_two_commands_make_a_network_for_members_alone(tmp_path: Path) -> None:
     assert "Traceback" not in up.err and "was killed" not in up.err, up.err
 
 
-def test_the_verb_makes_shows_and_revokes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_verb_makes_shows_renews_and_revokes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     root = str(tmp_path / "root")
 
     def run(*words: str) -> tuple[int, str, str]:
@@ -496,6 +511,16 @@ def test_the_verb_makes_shows_and_revokes(tmp_path: Path, capsys: pytest.Capture
                            "`holozen secure init` makes an authority\n")  # fmt: skip
     assert run("init", "--host", "robot.local")[0] == run("add", "viewer", "Bob")[0] == 0
     assert "Bob              viewer     until " in run("show")[1]
+    certificates = [Path(root, name, "cert.pem") for name in ("router", "Bob")]
+    before = [x509.load_pem_x509_certificate(file.read_bytes()) for file in certificates]
+    assert run("renew", "--days", "500")[0] == 0
+    for old, file in zip(before, certificates, strict=True):
+        new = x509.load_pem_x509_certificate(file.read_bytes())
+        assert new.not_valid_after_utc > old.not_valid_after_utc
+        assert new.public_key() == old.public_key()
+        assert list(new.extensions) == list(old.extensions)
+    assert f"Bob              viewer     until {new.not_valid_after_utc:%Y-%m-%d}" in run("show")[1]
+    assert run("renew", "router", "Ann")[2].startswith("holozen secure renew: there is no member 'Ann'; there are: ")
     assert run("add", "viewer", "../Bob")[2].startswith("holozen secure add: '../Bob': use a letter")
     assert run("revoke", "Bob")[0] == 0
     with pytest.raises(AuthorityError, match="there is no member 'Bob'; there are: router, sim"):

@@ -76,6 +76,7 @@ VERBS = {
     "ros2": row(None, ("--ros-domain-id 300", 2, "use a number from 0 to 232"), endless=Endless("", "joins ROS 2")),
     "secure init": row("--secure {tmp}/{id}", ("--days 0", 2, "use a whole number from 1 to 3650"), bus=False),
     "secure add": row(None, ("viewer Bob --secure {tmp}/none", *NO_FILE), bus=False),
+    "secure renew": row(None, ("--secure {tmp}/none", *NO_FILE), bus=False),
     "secure revoke": row(None, ("Bob --secure {tmp}/none", *NO_FILE), bus=False),
     "secure show": row(None, ("--secure {tmp}/none", *NO_FILE), bus=False),
     "run": row(None, ("{tmp}/none.py", 1, "none.py does not exist")),  # what else it does is in tests/unit/ros
