@@ -29,7 +29,8 @@ def _add(authority: Any, root: Path, args: argparse.Namespace) -> str:
 
 def _renew(authority: Any, root: Path, args: argparse.Namespace) -> str:
     authority.renew(root, args.names, args.days)
-    return f"{root}: new certificates; where members work elsewhere, copy the new cert.pem of each there"
+    elsewhere = "where members work elsewhere, copy the new cert.pem of each there, and members.json to router and sim"
+    return f"{root}: new certificates; {elsewhere}"
 
 
 def _revoke(authority: Any, root: Path, args: argparse.Namespace) -> str:

@@ -67,9 +67,8 @@ def load(folder: str) -> Member:
     name = str(names[0].value) if names else ""
     end = certificate.not_valid_after_utc
     if end < datetime.datetime.now(datetime.UTC):
-        raise BusError(
-            f"{path / CERTIFICATE}: the certificate of {name} expired on {end:%Y-%m-%d}; write holozen secure renew"
-        )
+        expired = f"the certificate of {name} expired on {end:%Y-%m-%d}"
+        raise BusError(f"{path / CERTIFICATE}: {expired}; `holozen secure renew` issues a new one")
     return Member(name, key, end.timestamp())
 
 
