@@ -178,7 +178,7 @@ def test_it_outlives_its_source(town: Wire, fred: Robot, flood: Flood) -> None:
     assert fred.status().stopped.startswith("setter@")
 
 
-def test_any_zenoh_tool_can_set_it_and_ask_for_it(fred: Robot, foreign: zenoh.Session) -> None:
+def test_any_zenoh_tool_can_set_it_and_ask_for_it(sim: Process, fred: Robot, foreign: zenoh.Session) -> None:
     def get(key: str) -> dict[str, object]:
         (reply,) = foreign.get(key)
         assert reply.ok is not None
@@ -189,6 +189,11 @@ def test_any_zenoh_tool_can_set_it_and_ask_for_it(fred: Robot, foreign: zenoh.Se
     assert get("Fred/cmd_vel_status")["stopped"] == "an unknown caller"
     get("Fred/release")
     assert get("Fred/cmd_vel_status")["stopped"] == ""
+    sim.signal(signal.SIGSTOP)
+    asked = [foreign.get(f"Fred/{verb}") for verb in ("release", "stop")]  # which are read together
+    sim.signal(signal.SIGCONT)
+    assert [len([*replies]) for replies in asked] == [1, 1]
+    assert get("Fred/cmd_vel_status")["stopped"] == "an unknown caller"
 
 
 def test_a_stop_stops_the_robot_whatever_the_request_holds(fred: Robot, foreign: zenoh.Session) -> None:
