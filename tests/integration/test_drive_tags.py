@@ -7,7 +7,7 @@ from statistics import fmean, stdev
 import pytest
 
 from holozen import entities
-from holozen.messages import Odometry
+from holozen.messages import Odometry, Pose
 from holozen.testing import LockStep
 
 from .robots import place, speeds, time_of
@@ -66,6 +66,12 @@ def test_origin_noise_and_limits_are_those_of_the_tags(lock_step: Callable[..., 
     assert speeds(sim.step(120))[0] == pytest.approx(0.25, abs=5e-3), "0.5 m/s^2 for 0.5 s"
     assert place(sim.odom) == pytest.approx((0.0625, 0, 0), abs=2e-3)
     sim.drive(turn=1.0)
-    assert speeds(sim.step(60))[2] == pytest.approx(0.3, abs=1e-3)
+    assert speeds(sim.step(60)) == pytest.approx((0, 0, 0.3), abs=1e-3)
+    entities.delete(sim.bus, "second")
+    entities.spawn(sim.bus, "second", text(TAGS["second"]), Pose.of((0, 2, 0), (0, 0, 0.5**0.5, 0.5**0.5)))
+    sim.step()
+    sim.drive(x=1.0)
+    assert place(sim.step(120)) == pytest.approx((0.0625, 0, 0), abs=2e-3), "forward, whichever way it faced"
+    assert entities.pose(sim.bus, "second").position.y == pytest.approx(2.0625, abs=2e-3)
     sim.drive()
     assert max(map(abs, speeds(sim.step(2)))) < 1e-3, "a stop is immediate"

@@ -99,6 +99,9 @@ def test_the_measured_velocity_is_the_commanded_one_as_the_body_sees_it(world: W
     for _ in range(10):
         run(world, (base, velocity), seconds=0.4)
         assert base.velocity(DT) == pytest.approx(velocity, abs=1e-4)
+        base.wake()  # from then on, the engine moves it
+        run(world, (base, velocity), seconds=DT)
+        assert base.velocity(DT) == pytest.approx(velocity, abs=1e-4)
 
 
 @pytest.mark.engines
