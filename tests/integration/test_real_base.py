@@ -25,6 +25,7 @@ from holozen.messages import CommandStatus, Odometry, TriggerReply, TriggerReque
 from holozen.testing import Process, Terminal, Wire, wait_for
 from holozen.testing.conformance import PROMISES, Probe, name
 from holozen.transport.graph import on_key
+from holozen.wire import COMMAND_SILENCE, MAX_COMMAND_BYTES
 
 REPO = Path(__file__).parents[2]
 PAGE = REPO / "docs" / "real-robots.md"
@@ -295,7 +296,55 @@ def test_what_is_no_limit_and_no_name_is_refused(wire: Wire, tmp_path: Path) -> 
     for wrong, expected in wrongs:
         with pytest.raises(ValueError, match=expected):
             Base(bus, **wrong)
-    assert Base(bus, state=str(tmp_path)).velocity() == STOP
+    base = Base(bus, state=str(tmp_path), max_linear=0.3, max_angular=0.5)
+    assert base.velocity() == STOP
+    driver = wire.bus("driver")
+    commands: Any = driver.publisher("cmd_vel", Twist)
+    statuses = driver.latest("cmd_vel_status", CommandStatus)
+
+    def is_refused() -> bool:
+        commands.put_bytes(b'{"linear":{"x":0.1}}'.ljust(MAX_COMMAND_BYTES + 1))
+        assert base.velocity() == STOP
+        status, _ = statuses.read()
+        return status is not None and status.refused.get("oversized", 0) > 0
+
+    wait_for(is_refused)
+    wait_for(lambda: commands.put(Twist.planar(0.4, turn=-1.0)) or base.velocity() == (0.3, 0.0, -0.5))
+
+
+def test_it_stands_when_its_driver_is_gone_or_silent(
+    wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    base = Base(wire.bus("base", lasting=True), state=tmp_path)
+    driver, now = wire.bus("driver"), [time.monotonic()]
+    commands: Any = driver.publisher("cmd_vel", Twist)
+    wait_for(lambda: commands.put(Twist.planar(0.1)) or base.velocity() != STOP)
+    monkeypatch.setattr("holozen.command.base.time", SimpleNamespace(monotonic=lambda: now[-1], time=time.time))
+    now.append(time.monotonic() + COMMAND_SILENCE + 0.01)
+    assert base.velocity() == STOP, "the watchdog"
+    now.append(time.monotonic())
+    wait_for(lambda: commands.put(Twist.planar(0.1)) or now.append(time.monotonic()) or base.velocity() != STOP)
+    driver.close()
+    wait_for(lambda: base.velocity() == STOP, what="it to stand, though no time passes")
+
+
+def test_its_pose_is_where_the_velocities_that_it_measured_have_brought_it(
+    wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = count(time.monotonic(), 0.5)
+    now = next(clock)
+    monkeypatch.setattr("holozen.command.base.time", SimpleNamespace(monotonic=lambda: now, time=time.time))
+    base, odom = Base(wire.bus("base", lasting=True), state=tmp_path), wire.bus("reader").latest("odom", Odometry)
+    for velocity in ((0.2, 0.0, 0.0), (0.0, 0.0, math.pi), (0.2, 0.4, 0.0)):
+        now = next(clock)
+        base.publish(velocity)
+
+    def place() -> tuple[float, float, float] | None:
+        base.publish(STOP)
+        newest, _ = odom.read()
+        return newest and newest.pose.pose.planar()
+
+    wait_for(lambda: place() == pytest.approx((-0.1, 0.1, math.pi / 2)), what=place)
 
 
 WHEELS = """
