@@ -316,14 +316,20 @@ def test_it_stands_when_its_driver_is_gone_or_silent(
     wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     base = Base(wire.bus("base", lasting=True), state=tmp_path)
-    driver, now = wire.bus("driver"), [time.monotonic()]
+    driver = wire.bus("driver")
     commands: Any = driver.publisher("cmd_vel", Twist)
     wait_for(lambda: commands.put(Twist.planar(0.1)) or base.velocity() != STOP)
-    monkeypatch.setattr("holozen.command.base.time", SimpleNamespace(monotonic=lambda: now[-1], time=time.time))
-    now.append(time.monotonic() + COMMAND_SILENCE + 0.01)
+    now = time.monotonic() + COMMAND_SILENCE + 0.01
+    monkeypatch.setattr("holozen.command.base.time", SimpleNamespace(monotonic=lambda: now, time=time.time))
     assert base.velocity() == STOP, "the watchdog"
-    now.append(time.monotonic())
-    wait_for(lambda: commands.put(Twist.planar(0.1)) or now.append(time.monotonic()) or base.velocity() != STOP)
+
+    def moves() -> bool:
+        nonlocal now
+        commands.put(Twist.planar(0.1))
+        now = time.monotonic()
+        return base.velocity() != STOP
+
+    wait_for(moves)
     driver.close()
     wait_for(lambda: base.velocity() == STOP, what="it to stand, though no time passes")
 
@@ -331,20 +337,19 @@ def test_it_stands_when_its_driver_is_gone_or_silent(
 def test_its_pose_is_where_the_velocities_that_it_measured_have_brought_it(
     wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    clock = count(time.monotonic(), 0.5)
-    now = next(clock)
+    now = time.monotonic()
     monkeypatch.setattr("holozen.command.base.time", SimpleNamespace(monotonic=lambda: now, time=time.time))
     base, odom = Base(wire.bus("base", lasting=True), state=tmp_path), wire.bus("reader").latest("odom", Odometry)
     for velocity in ((0.2, 0.0, 0.0), (0.0, 0.0, math.pi), (0.2, 0.4, 0.0)):
-        now = next(clock)
+        now += 0.5
         base.publish(velocity)
 
-    def place() -> tuple[float, float, float] | None:
+    def is_there() -> bool:
         base.publish(STOP)
         newest, _ = odom.read()
-        return newest and newest.pose.pose.planar()
+        return newest is not None and newest.pose.pose.planar() == pytest.approx((-0.1, 0.1, math.pi / 2))
 
-    wait_for(lambda: place() == pytest.approx((-0.1, 0.1, math.pi / 2)), what=place)
+    wait_for(is_there)
 
 
 WHEELS = """

@@ -1,4 +1,4 @@
-"""Whose commands and clocks count in the secure set-up: those of the members in the list, while their certificates do."""
+"""Whose commands and clocks count in the secure set-up: those of listed members with a valid certificate."""
 
 from pathlib import Path
 from types import SimpleNamespace
