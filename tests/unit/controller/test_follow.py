@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import struct
 import threading
 import time
 from collections import deque
@@ -31,6 +32,7 @@ from holozen.messages import (
     TwistWithCovariance,
 )  # fmt: skip
 from holozen.messages import nav2_msgs as nav
+from holozen.messages.codec import encode, encoding
 from holozen.messages.unique_identifier_msgs import UUID
 from holozen.testing import Wire, wait_for
 from holozen.transport.actions import State, new_id
@@ -40,6 +42,7 @@ from services.controller.follow import HELD_UP, LATE, Backlog, Follower
 from services.controller.goto import Gains, Leg
 
 QUICK = Gains(max_speed=2, max_turn=5, max_acceleration=10, max_turn_acceleration=20, linear=3, angular=3)
+MARK = 123.456  # m
 STEP = 0.01  # s of the robot's clock between two odoms
 GOALS = [(0.5, 0.0, 1.0), (0.5, 0.5, 0.0)]
 
@@ -318,7 +321,8 @@ def test_asked_to_stop_it_ends_its_lap_and_halts_the_robot(case: Case) -> None:
 def send(case: Case, x: float, y: float, frame: str = "odom") -> None:
     goals = case.robot.bus.publisher("goal_pose", PoseStamped)
     wait_for(lambda: goals.matched)
-    goals.put(PoseStamped(Header(frame_id=frame), Pose(Point(x, y))))
+    payload = encode(PoseStamped(Header(frame_id=frame), Pose(Point(MARK, y))), "cdr")
+    goals.put_bytes(payload.replace(struct.pack("<d", MARK), struct.pack("<d", x)), encoding("cdr", PoseStamped))
 
 
 def test_a_goal_of_goal_pose_comes_before_the_list_and_the_robot_stays_until_a_resume(case: Case) -> None:
@@ -469,8 +473,11 @@ def test_a_goal_of_goal_pose_waits_while_another_drives(case: Case) -> None:
 
 @pytest.mark.parametrize(
     ("x", "frame", "reason"),
-    [(1.0, "camera", "its frame is 'camera'; give it in 'odom'"), (2e6, "odom", "it is more than 1e+06 m away")],
-)
+    [
+        (1.0, "camera", "its frame is 'camera'; give it in 'odom'"), (2e6, "odom", "it is more than 1e+06 m away"),
+        (math.nan, "odom", "pose.position.x is not a finite number"),
+    ],
+)  # fmt: skip
 def test_an_implausible_goal_is_refused(case: Case, x: float, frame: str, reason: str) -> None:
     case.goals()
     send(case, x, 0.0, frame)

@@ -3,6 +3,7 @@
 import math
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -183,6 +184,19 @@ def test_a_zero_on_one_topic_is_no_stop_while_its_source_pushes_on_another(topic
     topics.take("right", 1.0, 11.0, "other@2")
     topics.take("left", 0.0, 11.1, "other@2")
     assert topics.pushes(11.1) == {"right": 2.0}
+
+
+def test_what_a_slow_link_brings_moves_no_joint_and_no_body_until_its_sender_has_answered() -> None:
+    for message in (JointState(name=["w"], velocity=[5.0]), Wrench(Vector3(1.0))):
+        senders, arbiter, stats = FakeSenders(), Arbiter(0.5), CommandStats(lambda _: None)
+        joints = JointInput("key", senders, stats, [(frozenset("w"), arbiter)], ["w"])
+        read: Any = joints if isinstance(message, JointState) else ForceInput(("key",), arbiter, senders, stats)
+        for number, answered in ((1, False), (2, True)):
+            sent, now = 10.0 + number, 10.1 + number
+            stamp = f"me@aa;{number};{round((sent + senders.offset) * 1e9)}"
+            read.take([received(message, stamp, key="key")], Moment(now, now, ()))
+            assert (not is_stop(arbiter.motion(now)), stats.refused, senders.asked) == (answered, {"late": 1}, ["aa"])
+            senders.answers["aa"] = now + 0.1
 
 
 def test_a_zero_for_one_joint_is_no_stop_while_its_source_moves_another() -> None:
