@@ -189,9 +189,9 @@ def main() -> int:
             compare("warm up", "", sides, turns=2, count=flat)
         cases = [
             compare("flat out", AIM, untyped, turns, flat),
-            compare("flat out", "", with_msgspec, turns, flat),
+            compare("flat out, typed", "", with_msgspec, turns, flat),
             compare(f"paced at {RATE:g} Hz", AIM, untyped, turns, paced, 1 / RATE),
-            compare(f"paced at {RATE:g} Hz", "", with_msgspec, turns, paced, 1 / RATE),
+            compare(f"paced at {RATE:g} Hz, typed", "", with_msgspec, turns, paced, 1 / RATE),
         ]
     publish("latency", cases, args.json)
     return 0

@@ -70,7 +70,8 @@ def test_payloads_and_encodings_are_those_of_the_bag(verb: Verb, wire: Wire, tmp
     rows = [(f"any/{i}", payload, encoding, i * 5) for i, (encoding, payload) in enumerate(PAYLOADS.items())]
     tap = wire.bus().subscribe_raw("any/**")
     done = verb(wire, "replay", bag(tmp_path / "a.mcap", *rows))
-    assert (done.returncode, done.stderr) == (0, "")
+    stalls = [line for line in done.stderr.splitlines() if line.startswith("replay did not run for ")]  # a busy machine
+    assert (done.returncode, done.stderr.splitlines()) == (0, stalls)
     assert done.stdout.startswith(f"played {len(rows)} messages in ")
     assert [(s.key, s.payload, s.encoding) for s in heard(tap, count=len(rows))] == [
         (key, p, e) for key, p, e, _ in rows

@@ -21,7 +21,9 @@ CASES = {
     },
     "latency": {
         "flat out": ["holozen", "raw zenoh", "ratio"],
+        "flat out, typed": ["holozen", "zenoh and msgspec", "ratio"],
         "paced at 50 Hz": ["holozen", "raw zenoh", "ratio"],
+        "paced at 50 Hz, typed": ["holozen", "zenoh and msgspec", "ratio"],
     },
     "startup": {
         "first line, odom at 500 Hz": ["holozen", "raw zenoh", "python alone", "ratio"],
