@@ -35,7 +35,6 @@ IN_CI = os.environ.get("CI") == "true"
 QUICK = HERE / "unit"
 SLOW = {QUICK / "cli" / "test_stop_verb.py", QUICK / "teleop", QUICK / "transport", QUICK / "test_benchmarks.py"}
 """Of these, what takes, or waits, as long as other tests."""
-BEGIN = 0.3  # of the other tests; then the quick ones begin
 SHARED = {"town", "fleet", "kiwi", "eye"}
 """Fixtures of a file whose processes run, and cost time, from the first test that uses them until the file's last."""
 REORDERED = {HERE / "faults", HERE / "integration", HERE / "terminals"}
@@ -63,15 +62,15 @@ def pytest_sessionfinish(exitstatus: int) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    quick, slow = list[Path](), list[Path]()
-    for path in dict.fromkeys(item.path for item in items):
-        (quick if QUICK in path.parents and SLOW.isdisjoint((path, path.parent)) else slow).append(path)
-    # The slow ones mostly wait, so quick ones run among them; but no slow one is left over at the end.
-    order = {path: number / len(slow) for number, path in enumerate(slow)}
-    order |= {path: BEGIN + number / len(quick) for number, path in enumerate(quick)}
+    paths = dict.fromkeys(item.path for item in items)
 
-    def place(item: pytest.Item) -> tuple[float, bool]:
-        """In a file, the tests that share processes come last."""
+    def is_quick(path: Path) -> bool:
+        return QUICK in path.parents and SLOW.isdisjoint((path, path.parent))
+
+    order = {path: (is_quick(path), number) for number, path in enumerate(paths)}
+
+    def place(item: pytest.Item) -> tuple[tuple[bool, int], bool]:
+        """The long files first: none is left over at the end. In a file, the tests that share processes last."""
         shares = item.path.parent in REORDERED and not SHARED.isdisjoint(getattr(item, "fixturenames", ()))
         return order[item.path], shares
 
