@@ -242,7 +242,10 @@ class Page:
         if before is None:
             camera.look_at = shown.position
         elif before != shown.position:
-            camera.position = camera.position + [a - b for a, b in zip(shown.position, before, strict=True)]
+            # What the page last reported of its camera may be older than the last step, but not the line of sight.
+            eye = shown.position + (camera.position - camera.look_at)
+            with self._client.atomic():
+                camera.position, camera.look_at = eye, shown.position
 
     def _look_down(self) -> None:
         shown = self._scene.shown.get(self.robot)

@@ -147,6 +147,18 @@ def test_a_held_button_drives_the_robot_that_it_was_pressed_for_and_no_other(cha
     assert robots.motion(now) == FORWARD, "pressed again, it drives the one that is chosen now"
 
 
+def test_a_robot_that_is_followed_stays_in_the_middle_though_a_slow_page_reports_an_older_camera() -> None:
+    it = Buttons()
+    camera = it.client.camera = SimpleNamespace(position=np.array((-3.0, 0.0, 2.0)), look_at=np.zeros(3))
+    it.client.gui.add_checkbox.return_value.value = True
+    it.page.update(0.0)
+    for x in (1.0, 3.0):
+        it.robots.shown["a"].position = (x, 2.0, 0.0)
+        it.page.update(0.0)
+        assert (*camera.position, *camera.look_at) == (x - 3.0, 2.0, 2.0, x, 2.0, 0.0)
+        camera.position, camera.look_at = np.array((-3.0, 0.0, 2.0)), np.zeros(3)
+
+
 @pytest.mark.parametrize(("aspect", "looks"), [(390 / 844, PORTRAIT), (1280 / 800, None)])
 def test_a_phone_looks_so_that_the_start_is_above_its_panel(aspect: float, looks: object) -> None:
     camera = Buttons(aspect).client.camera
