@@ -38,7 +38,7 @@ from services.sim.entities import Entities, Entity
 from services.sim.io.entity_services import EntityServices
 from services.sim.loop import Loop
 from services.sim.physics.engine import UPRIGHT
-from services.sim.physics.planar import PlanarBody
+from services.sim.physics.planar import FAR, PlanarBody
 from services.sim.physics.world import World
 
 REPO = Path(__file__).parents[3]
@@ -495,6 +495,7 @@ def test_robots_that_come_and_go_under_the_same_names_leave_nothing_in_memory(to
                 town.spawn("Fred", text)
                 town.loop.run(threading.Event(), 1)
                 town.services.delete(si.DeleteEntityRequest("Fred"))
+        town.loop.run(threading.Event(), FAR)  # so long a body that is gone may wait for its next look
         gc.collect()
         info = in_use()
         return info.uordblks + info.hblkhd, sys.getallocatedblocks()
@@ -502,7 +503,7 @@ def test_robots_that_come_and_go_under_the_same_names_leave_nothing_in_memory(to
     come_and_go(30)  # what is made once
     before, after = come_and_go(1), come_and_go(100)
     assert (after[0] - before[0]) / 200 < 400, "bytes for each"
-    assert (after[1] - before[1]) / 200 < 20, "blocks for each"
+    assert (after[1] - before[1]) / 200 < 3, "blocks for each"
 
 
 def test_errors_of_a_robot_are_reported_before_its_name_is_checked(town: Town) -> None:
