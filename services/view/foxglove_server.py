@@ -34,7 +34,7 @@ from holozen.transport.samples import RawSubscriber
 from holozen.transport.services import call_bytes, frees
 from holozen.wire import PRIORITY_OF, is_command, stop
 
-from .guard import MAX_AGE, Guard, TimedConnection
+from .guard import MAX_AGE, Guard, TimedConnection, undated
 
 PROTOCOL = Subprotocol("foxglove.sdk.v1")
 OLDER = Subprotocol("foxglove.websocket.v1")  # the same by another name, which older clients ask for
@@ -42,7 +42,6 @@ MESSAGE, CALL_OF = b"\x01", b"\x02"  # the first bytes of frames in which a clie
 LOOK_EVERY, DRAIN_EVERY = 0.5, 0.01  # s; how often the graph is read, and the topics are
 DEPTH = 64  # messages of a topic that wait
 CALL = 5.0  # s for a service
-DATE = 8  # bytes after a client's message, see Guard
 LARGEST = 16_000_000  # bytes that a client may send at once
 MAX_STOPS = 64  # of a channel: one for each set of joints that a client names
 TURN = 0.5  # s without a motion command by the client that drives a robot, after which another one may drive
@@ -379,8 +378,7 @@ class Server(ServerListener):
         """A client publishes a message."""
         if client.id in self._vouched:
             with self._reporting_errors():
-                sent = int.from_bytes(data[-DATE:], "little") * 1e-9
-                self._commands.put(client.id, client_channel_id, data[:-DATE], sent)
+                self._commands.put(client.id, client_channel_id, *undated(data))
 
     def on_get_parameters(
         self, client: Any, param_names: list[str], request_id: str | None = None

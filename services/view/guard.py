@@ -23,6 +23,7 @@ from websockets.frames import DATA_OPCODES, Frame, Opcode
 from websockets.http11 import Request, Response
 
 PING_EVERY = 0.05  # s
+DATE = 8  # bytes after a message that has a date, see Guard
 MAX_AGE = 0.3  # s; what may be older moves nothing, and ends no stop
 LET_GO = b"""<script>
 addEventListener("blur", () => document.querySelectorAll("button").forEach(
@@ -40,12 +41,17 @@ def moves(data: bytes) -> bool:
     return any(part in data for part in (*MOVING, *FREEING))
 
 
+def undated(data: bytes) -> tuple[bytes, float]:
+    """A message without its date, and the time (s, monotonic) since which it was sent."""
+    return data[:-DATE], int.from_bytes(data[-DATE:], "little") * 1e-9
+
+
 class Guard:
     """Refuses requests without the `token` (unless that is empty), from pages of other web sites, and for other hosts.
 
-    `moves` tells whether the data of a frame may move a robot, and `dates` whether it gets, as its last 8 bytes, the
-    time (ns, monotonic, little-endian) since which it was sent. `apps`: pages of other web sites may connect if they
-    have the token.
+    `moves` tells whether the data of a frame may move a robot, and `dates` whether it gets a date, which `undated`
+    takes off: the time (ns, monotonic, little-endian) since which it was sent. `apps`: pages of other web sites may
+    connect if they have the token.
     """
 
     def __init__(self, token: str, apps: bool = False) -> None:
@@ -144,9 +150,8 @@ class TimedConnection(websockets.ServerConnection):
     def _counts(self, frame: Frame, now: float) -> bool:
         """Whether a frame of data counts. The date of its message goes after the last frame."""
         if frame.opcode is not Opcode.CONT:
-            self._date = (
-                int(self._answered * 1e9).to_bytes(8, "little") if self._guard.dates(bytes(frame.data)) else b""
-            )
+            has_date = self._guard.dates(bytes(frame.data))
+            self._date = int(self._answered * 1e9).to_bytes(DATE, "little") if has_date else b""
         if self._date:
             frame.data = bytes(frame.data) + self._date * frame.fin
         elif now - self._answered > MAX_AGE and self._guard.moves(bytes(frame.data)):
