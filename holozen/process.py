@@ -74,10 +74,14 @@ class Ending:
     Zenoh's own threads run on after its sessions are closed. One that enters Python while the interpreter is being
     finalized aborts the process, and one that uses statics that the C library has destroyed by then panics
     (eclipse-zenoh/zenoh#1904). So the last callback of atexit ends the process. Callbacks run in the
-    reverse order of their registration: make the Ending before anything else registers one.
+    reverse order of their registration: make the Ending before anything else registers one. `of_verb`: the process is
+    one of `holozen VERB`, which it ends with.
     """
 
-    def __init__(self) -> None:
+    of_verb = False
+
+    def __init__(self, *, of_verb: bool = False) -> None:
+        Ending.of_verb = of_verb
         self.code = 1  # of an uncaught exception
         self._before: Callable[[int, FrameType | None], object]
         atexit.register(self._end)
@@ -109,7 +113,7 @@ class Ending:
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
-    """Discard what C code prints to stderr."""
+    """Discard what code that is not Python's prints to stderr, and all else that is printed there."""
     saved, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 2)
     try:

@@ -41,6 +41,9 @@ REORDERED = {HERE / "faults", HERE / "integration", HERE / "terminals"}
 LONG = os.environ.get("HOLOZEN_LONG") == "1"
 
 
+os.environ["RUST_BACKTRACE"] = "0"  # a panic of Zenoh's is a line, as for users; a trace takes as long as a verb
+
+
 def pytest_configure(config: pytest.Config) -> None:
     # A run in the background, or under nohup, ignores these, and so would all that it starts.
     for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):

@@ -98,7 +98,7 @@ def main(argv: list[str] | None = None) -> int:
         return _guarded(argv)
     if sys.stdout.errors == "strict":  # names may have letters that the terminal's encoding lacks
         sys.stdout.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
-    ending = Ending()
+    ending = Ending(of_verb=True)
     sys.unraisablehook = interrupt_again
     code: int | str | None
     try:

@@ -16,6 +16,7 @@ import zenoh
 
 from holozen.background import at_once, background
 from holozen.console import report
+from holozen.process import Ending
 from holozen.transport import rendezvous
 from holozen.transport.connection import CLIENT_TRY, Connection, are_near, covers, socket_path
 from holozen.transport.errors import BusError
@@ -24,6 +25,7 @@ from holozen.transport.graph import WITNESSED, Graph, Witness, peers
 LAST = 1.0  # s to wait for threads at the end of the process
 MAX_TOKENS = 1 << 15  # that wait, of 240 bytes each, which Zenoh takes bit by bit in a process's first hours
 CLOSE_LIMIT = 0.15  # s; a session whose peer hangs would take 10 s to close
+SETTLED = 0.03  # s after opening, when a peer has the links to those it was told of (5 to 10 ms on an idle machine)
 
 
 FORKED = (
@@ -34,10 +36,13 @@ _process = 0  # the one that has used Zenoh: its threads are not in those that a
 
 
 class Opened:
-    """An open session. `took`: s until its first link, a measure of the network's delay."""
+    """An open session. `took`: s until its first link, a measure of the network's delay. `linked`: time.monotonic() of
+    that link, or of the opening. For `settling` seconds after it the session is not closed.
+    """
 
-    def __init__(self, session: Any, took: float = 0.0) -> None:
-        self.session, self.took = session, took
+    def __init__(self, session: Any, took: float = 0.0, settling: float = 0.0) -> None:
+        self.session, self.took, self._settling = session, took, settling
+        self.linked = time.monotonic()
         self.keeper: threading.Thread | None = None
         self.listens: list[str] = []  # the endpoints of this session itself
         self.taken: list[str] = []  # the endpoints where it would have listened, but meets another process that does
@@ -45,14 +50,19 @@ class Opened:
         self.point = ""  # the meeting point that this session itself holds
 
     def close(self) -> None:
-        """Close it, even if it is closed already."""
+        """Close it, even if it is closed already.
+
+        A link that Zenoh makes meanwhile stays open on both sides until this process ends, and Zenoh panics over what
+        comes in through it. So a new session has time first to make those that it was told of.
+        """
         rendezvous.held.discard(self.point)
+        time.sleep(max(0.0, self.linked + self._settling - time.monotonic()))
         close(self.session)
 
 
 class Opening:
-    """A session that is being opened: `early` in a thread, while the caller loads and checks what it needs, else by the
-    time that this returns. `opened` waits for it, and raises its error. `closing`: set it to give up.
+    """A session that is being opened: `early`, for a verb, in a thread while the caller loads and checks what it needs,
+    else by the time that this returns. `opened` waits for it, and raises its error. `closing`: set it to give up.
 
     If `lasting`, it holds a meeting point, and as a client waits for its router until `stop`. Others give up after
     `patience` seconds, by default 5, where a process listens and does not answer, or there is no router.
@@ -73,10 +83,11 @@ class Opening:
         _process = os.getpid()
         self.where, self.wire, self.closing = connection.where, connection.wire, threading.Event()
         self.networks = connection.networks
-        self.secure = connection.secure
+        self.secure, self.is_of_verb = connection.secure, early
         opening = partial(
             open_session, connection, lasting=lasting, stop=stop or self.closing, closing=self.closing,
             patience=None if lasting else rendezvous.PATIENCE if patience is None else patience,
+            settling=0.0 if early and Ending.of_verb else SETTLED,
         )  # fmt: skip
         try:
             self.opened = background(opening) if early else at_once(opening)
@@ -86,9 +97,15 @@ class Opening:
 
 
 def open_session(
-    connection: Connection, *, lasting: bool, patience: float | None, stop: threading.Event, closing: threading.Event
+    connection: Connection,
+    *,
+    lasting: bool,
+    patience: float | None,
+    settling: float,
+    stop: threading.Event,
+    closing: threading.Event,
 ) -> Opened:
-    """Open a session; if `lasting` it holds a free meeting point until `closing` is set.
+    """Open a session; if `lasting` it holds a free meeting point until `closing` is set. `settling` as in Opened.
 
     A client waits for its router, at most `patience` s (None: for ever), a peer for a process that is there to answer.
     Exits with code 0 when `stop` is set. Raises BusError.
@@ -98,7 +115,7 @@ def open_session(
     mode = _value(config, "mode") or "peer"
     if mode == "client":
         return Opened(_open_client(connection, config, patience, stop), min(time.monotonic() - begin, CLIENT_TRY))
-    opened = _open_listening(connection, config, mode)
+    opened = _open_listening(connection, config, mode, settling)
     points = connection.rendezvous
     if lasting and points and not opened.point:
         opened.keeper = rendezvous.hold(points, closing, open_point)
@@ -115,11 +132,12 @@ def open_session(
             closer.start()
             wait_for_threads((closer, opened.keeper), CLOSE_LIMIT)
             raise
-    opened.took = time.monotonic() - begin
+    opened.linked = time.monotonic()
+    opened.took = opened.linked - begin
     return opened
 
 
-def _open_listening(connection: Connection, config: zenoh.Config, mode: str) -> Opened:
+def _open_listening(connection: Connection, config: zenoh.Config, mode: str, settling: float) -> Opened:
     """The session of a peer or a router. A peer skips the endpoints that are in use."""
     listen, taken = endpoints(config, "listen", mode), []
     while True:
@@ -130,7 +148,7 @@ def _open_listening(connection: Connection, config: zenoh.Config, mode: str) -> 
             if "id" not in dict(connection.cfg):
                 config.insert_json5("id", json.dumps(new_id(listen, connection.rendezvous)))
         try:
-            opened = Opened(zenoh.open(config))
+            opened = Opened(zenoh.open(config), settling=settling)
         except zenoh.ZError as error:
             used = next((one for one in listen if _is_taken(one, str(error))), None)
             if mode != "peer" or not used:

@@ -1,15 +1,18 @@
 """At its end a process closes what it left open. It waits for threads that come out of Zenoh, and not for ever."""
 
 import gc
+import os
 import subprocess
 import sys
 import weakref
+from types import SimpleNamespace
 
 import pytest
 
 from holozen.bus import Bus
 from holozen.messages import Odometry
 from holozen.testing import Wire, wait_for
+from holozen.transport.session import Opening
 
 ENDS = """
 import threading, time
@@ -66,6 +69,36 @@ def test_a_program_that_leaves_its_bus_open_ends_as_any_other(wire: Wire, words:
     done = subprocess.run(run, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout) == (code, "")
     assert done.stderr.splitlines()[-1:] == (["ZeroDivisionError: division by zero"] if "1 / 0" in words else [])
+
+
+SHORT_LIVES = """
+import os, sys
+from holozen.bus import Bus, Connection
+
+def live():
+    Bus("short", Connection(connect=(sys.argv[1],), listen=(sys.argv[1],))).close()
+    return len(os.listdir("/proc/self/fd"))
+
+before = live()
+print([live() for _ in range(20)][-1] - before)
+"""
+
+
+def test_a_bus_that_is_closed_at_once_leaves_no_link(wire: Wire) -> None:
+    """Zenoh makes links to those that it is told of in the background."""
+    buses = [wire.bus(name) for name in ("first", "second", "third", "fourth")]
+    wait_for(lambda: len(buses[-1].session.info.peers_zid()) == 3)
+    run = [sys.executable, "-c", SHORT_LIVES, wire.endpoint]
+    done = subprocess.run(run, capture_output=True, text=True, check=True, timeout=60)
+    assert int(done.stdout) <= 3, done
+
+
+def test_a_verb_does_not_show_what_zenoh_prints_as_it_closes(wire: Wire, capfd: pytest.CaptureFixture[str]) -> None:
+    bus = Bus("verb", Opening(wire.connection, early=True))
+    bus.listing.ends.append(SimpleNamespace(undeclare=lambda: os.write(2, b"thread 'rx-1' panicked\n")))
+    bus.close()
+    os.write(2, b"an error\n")
+    assert capfd.readouterr().err == "an error\n"
 
 
 def test_a_bus_that_was_closed_is_not_kept(wire: Wire) -> None:
