@@ -153,6 +153,9 @@ def nodes(connection: Connection) -> Iterator[Finding]:
         began = time.monotonic()
         robots = Robots(bus, endpoints)
         yield from meeting_points(connection, bus.connected())
+        if bus.member and (warning := bus.member.warning()):
+            text, _, fix = warning.partition("; ")
+            yield Finding("network", WARNING, text, fix)
         peers = ask_peers(bus) if bus.connected() else {}
         yield from versions(endpoints, peers, version("holozen"))
         yield from hidden(bus.hidden() if bus.connected() else ())

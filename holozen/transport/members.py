@@ -26,6 +26,7 @@ from holozen.transport.samples import PRIORITIES, Sample
 AUTHORITY, CERTIFICATE, KEY, MEMBERS = "ca.pem", "cert.pem", "key.pem", "members.json"
 LOOK = 0.5  # s between two checks for a new list
 SIGNATURE = 128  # hexadecimal digits
+RENEWAL = 30 * 86_400  # s before its end from which a certificate should be renewed
 
 
 class Member(NamedTuple):
@@ -34,6 +35,14 @@ class Member(NamedTuple):
     name: str
     key: Ed25519PrivateKey
     expires: float = math.inf
+
+    def warning(self) -> str:
+        """A warning of a certificate that expires soon; else empty."""
+        if self.expires > time.time() + RENEWAL:
+            return ""
+        end = datetime.datetime.fromtimestamp(self.expires, datetime.UTC)
+        expires = f"the certificate of {self.name} expires on {end:%Y-%m-%d %H:%M} UTC"
+        return f"{expires}; `holozen secure renew` issues a new one"
 
     def attachment(self, key: str, priority: str, stamp: bytes, encoding: str, payload: bytes) -> bytes:
         """The stamp and the proof that this member sent it."""

@@ -121,6 +121,8 @@ class Node:
                 from holozen.transport.listeners import exposure
 
                 report(f"{node}: {exposure(self.exposed)}")
+            if self.member and (warning := self.member.warning()):
+                report(f"{node}: {warning}")
             if self._opened().point:
                 self._keep(peers(self.session, zenoh.handlers.RingChannel(16), is_node=True))
                 self._keep(witness(self.session))
