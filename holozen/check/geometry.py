@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Iterable, Iterator
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -128,7 +129,7 @@ _NOT_ROLLING = re.compile(r"steer|caster|castor|swivel|roller|rotor|prop", re.IG
 _CASTER = re.compile(r"caster|castor|ball|swivel|roller", re.IGNORECASE)
 
 
-class Wheel(Struct, frozen=True, eq=False):
+class Wheel(Struct, frozen=True, eq=False, dict=True):
     """A link that turns on a continuous joint and rolls, with the `links` fixed to it. `shape` is its collision shape,
     else its visual one.
     """
@@ -149,12 +150,12 @@ class Wheel(Struct, frozen=True, eq=False):
         """z of its lowest point in the root frame, in metres."""
         return float(self.shape.farthest(DOWN)[2])
 
-    @property
+    @cached_property
     def half_width(self) -> float:
         """Half of its extent along the axle, in metres."""
         return self._reach(self.axis)
 
-    @property
+    @cached_property
     def radius(self) -> float:
         """Its largest distance from the axle, in metres."""
         axes = self.shape.frame.rotation.T
