@@ -82,7 +82,7 @@ class Field(NamedTuple):
 
     def line(self, package: str = "") -> str:
         """Its line in a .msg file of `package`."""
-        return f"{self.spelled(package)} {self.name}{'' if self.default is None else f' {json.dumps(self.default)}'}"
+        return f"{self.spelled(package)} {self.name}{'' if self.default is None else f' {_written(self.default)}'}"
 
 
 class Constant(NamedTuple):
@@ -94,7 +94,14 @@ class Constant(NamedTuple):
 
     def line(self) -> str:
         """Its line in a .msg file."""
-        return f"{self.type} {self.name}={self.value if isinstance(self.value, str) else json.dumps(self.value)}"
+        return f"{self.type} {self.name}={_written(self.value)}"
+
+
+def _written(value: Any) -> str:
+    """A value as a .msg file has it. Texts are in quotes: some are empty, or have a `#`."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(_written, value))}]"
+    return '"' + re.sub(r'["\\]', r"\\\g<0>", value) + '"' if isinstance(value, str) else json.dumps(value)
 
 
 class Interface:

@@ -65,7 +65,7 @@ def test_a_package_that_is_given_is_listed_and_shown(lesson: Path, capsys: pytes
     given = ("--package", f"lesson={lesson}")
     assert "    lesson/srv/NextGoal\n" in run(capsys, "list", *given)
     assert run(capsys, "show", "lesson/srv/NextGoal", *given) == (
-        "int64 request_goal 3\n---\nstring KIND=a?b\nfloat64 x_goal\ngeometry_msgs/Point[] path\n"
+        'int64 request_goal 3\n---\nstring KIND="a?b"\nfloat64 x_goal\ngeometry_msgs/Point[] path\n'
         "\tfloat64 x\n\tfloat64 y\n\tfloat64 z\n"
     )
     assert run(capsys, "proto", "lesson/srv/NextGoal", *given) == "request_goal: 3\n"

@@ -54,11 +54,12 @@ def test_a_field_is_read() -> None:
         ('string a "x # \\"y\\"" # no', Field("a", "string", default='x # "y"')),
         ("string a 'it''s'", Field("a", "string", default="it''s")),
         ("string a 'it\\'s'", Field("a", "string", default="it's")),
+        ("string a é\t\\", Field("a", "string", default="é\t\\")),
         ("int32[] n [1, -2,3]", Field("n", "int32", "sequence", default=[1, -2, 3])),
         ("int32[] n []", Field("n", "int32", "sequence", default=[])),
         ("string[2] n ['a, b', \"c\"]", Field("n", "string", "fixed", 2, default=["a, b", "c"])),
     ]:
-        assert section(line) == Section((field,), ())
+        assert section(line) == section(field.line()) == Section((field,), ())
 
 
 def test_a_constant_is_read() -> None:
@@ -69,8 +70,9 @@ def test_a_constant_is_read() -> None:
         ("string NAME=it's # a", Constant("NAME", "string", "it's")),
         ("string NAME=a = b", Constant("NAME", "string", "a = b")),
         ('string NAME="a # b"', Constant("NAME", "string", "a # b")),
+        ('string NAME=""', Constant("NAME", "string", "")),
     ]:
-        assert section(line) == Section((), (constant,))
+        assert section(line) == section(constant.line()) == Section((), (constant,))
 
 
 def test_comments_blank_lines_and_line_ends_are_ignored() -> None:
