@@ -110,16 +110,15 @@ def subscribers(endpoints: Iterable[Endpoint], key: str, matched: bool) -> int:
 
 def includes(expression: str, key: str) -> bool:
     """Whether a key expression with whole-chunk wildcards (`*`, `**`) includes a key."""
-    return _includes(expression.split("/"), key.split("/"))
-
-
-def _includes(pattern: list[str], chunks: list[str]) -> bool:
-    if not pattern:
-        return not chunks
-    first, *rest = pattern
-    if first == "**":
-        return any(_includes(rest, chunks[i:]) for i in range(len(chunks) + 1))
-    return bool(chunks) and first in ("*", chunks[0]) and _includes(rest, chunks[1:])
+    if "*" not in expression:
+        return expression == key
+    chunks, ends = key.split("/"), {0}  # how many chunks the expression so far may match
+    for part in expression.split("/"):
+        if part == "**":
+            ends = {*range(min(ends, default=len(chunks) + 1), len(chunks) + 1)}
+        else:
+            ends = {end + 1 for end in ends if end < len(chunks) and part in ("*", chunks[end])}
+    return len(chunks) in ends
 
 
 class Graph:

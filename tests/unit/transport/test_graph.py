@@ -86,6 +86,7 @@ def test_endpoints_on_a_key_are_those_of_the_kind_that_include_it() -> None:
     assert on_key([ODOM, reader, everywhere], "odom", "sub") == [reader, everywhere]
     assert on_key([ODOM, reader, everywhere], "Fred/odom", "sub") == [everywhere]
     assert on_key([ODOM, reader, everywhere], "odom", "pub") == [ODOM]
+    assert on_key([reader._replace(key="**/" * 40 + "odom")], "x/" * 40 + "y", "sub") == [], "in a moment"
 
 
 def graph_of(*changes: tuple[str, bool]) -> Graph:
