@@ -44,7 +44,7 @@ def _no_effort(subject: Subject) -> Iterator[Mistake]:
             continue
         for word, unit in (("effort", "N m (or N)"), ("velocity", "rad/s (or m/s)")):
             value = _value(limit, word, math.inf if subject.sdf or not _is_bounded(tag) else None)
-            if value is None and not limit.attributes.get(word):
+            if value is None and not limit.given(word):
                 yield Mistake(limit, f"the limit of {tag} has no {word}", f'add {word}="...", in {unit}')
             elif value == 0:
                 yield Mistake(limit, f"the limit of {tag} has {word} 0", f"give it a {word} above 0, in {unit}")

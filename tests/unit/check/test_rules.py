@@ -387,6 +387,8 @@ def test_sdf_has_the_same_rules(good_sdf: str, rules: Rules) -> None:
     ]:
         assert old in good_sdf
         assert rule in rules(good_sdf.replace(old, new, 1), "robot.sdf")
+    wrong = good_sdf.replace("<xyz>0 0 1</xyz>", "<xyz>0 0 1</xyz><limit><effort>abc</effort></limit>", 1)
+    assert rules(wrong, "robot.sdf") == ["number"]
 
 
 def test_in_sdf_a_plugin_counts_in_a_model_a_world_or_a_sensor(good_sdf: str, rules: Rules) -> None:
