@@ -440,9 +440,9 @@ def _is_port(text: str) -> bool:
 def _canonical(endpoint: str) -> str:
     """An endpoint in one form for the many ways to write it; empty for one at any free port."""
     kind, _, place = endpoint.partition("#")[0].partition("?")[0].partition("/")
-    if kind not in _WITH_PORT:
-        return f"{kind}/{os.path.normpath(place)}"
     host, _, port = place.rpartition(":")
+    if kind not in _WITH_PORT or not _is_port(port):
+        return f"{kind}/{os.path.normpath(place)}"
     host = host.strip("[]").lower()
     plain = host.removeprefix("::ffff:")
     is_here = plain in HERE or plain.startswith("127.") or plain == os.uname().nodename.lower()

@@ -248,6 +248,7 @@ NETWORKS: list[tuple[dict[str, Any], set[str]]] = [
     ({"secure": "/run/me/sim", "mode": "client"}, {"tls/127.0.0.1:7447"}),
     ({"secure": "/run/me/sim", "mode": "client", "connect": ("tls/localhost:7447",)}, {"tls/127.0.0.1:7447"}),
     ({"config": "/etc/../a.json5", "connect": (POINT,)}, {"the endpoints of /a.json5", POINT}),
+    ({"connect": ("tcp/robot",), "mode": "client"}, {"tcp/robot"}),  # of no use, but no error here
     ({"connect": ("tcp/127.0.0.1:0",), "listen": ("tcp/127.0.0.1:0",)}, {"tcp/127.0.0.1:0"}),
 ]  # fmt: skip
 
