@@ -33,6 +33,7 @@ R = TypeVar("R", bound="Message")
 
 LARGEST_STATE = 1_000_000  # bytes; an odom takes about 1,500
 DEALT = 1 << 14  # samples, or requests, of all keys of a Dealer that wait for it
+LONGEST_CALL = 1e9  # s; Zenoh takes no infinite timeout
 GETS = 256  # waiting queries for a publisher's last value, or for our clock; beyond, the oldest get no reply
 
 
@@ -297,5 +298,5 @@ def _check_call(key: object, request: object, reply: object, timeout: float) -> 
     _check_types(key, reply)
     if not isinstance(request, Message):
         raise TypeError(f"key {key!r}: the request {shorten(repr(request))} is not a message, such as TriggerRequest()")
-    if not (isinstance(timeout, int | float) and timeout >= 0):
-        raise BusError(f"key {key!r}: timeout {timeout!r}: use 0 s or more")
+    if not (isinstance(timeout, int | float) and 0 <= timeout <= LONGEST_CALL):
+        raise BusError(f"key {key!r}: timeout {timeout!r}: use 0 to {LONGEST_CALL:g} s")
