@@ -47,7 +47,7 @@ def info(args: argparse.Namespace) -> int:
 
 def _print_node(name: str, ends: list[Endpoint], as_json: bool) -> None:
     parts = {"sub": "subscribers", "pub": "publishers", "srv": "services"}
-    shown = [end for end in ends if end.kind in parts and not (is_any(end) or f"/{BELOW}/" in end.key)]
+    shown = [end for end in ends if end.kind in parts and not (is_any(end) or BELOW in end.key)]
     rows = [(parts[end.kind], end.key, end.type) for end in shown]
     rows += [("action_servers" if one.is_server else "action_clients", one.key, one.type) for one in found_in(ends)]
     named = {part: [{"key": key, "type": type} for where, key, type in rows if where == part] for part in TITLES}

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from holozen.transport.graph import Endpoint
     from holozen.transport.node import Node
 
-BELOW = "_action"
+BELOW = "/_action/"  # between an action's key and a part of it
 SEND, CANCEL, RESULT, FEEDBACK, STATUS = "send_goal", "cancel_goal", "get_result", "feedback", "status"
 
 KEPT = 10.0  # s that the result of a goal is kept after its end, as in ROS 2
@@ -73,7 +73,7 @@ class Cancel(IntEnum):
 
 def key_of(action: str, part: str) -> str:
     """The key of a service or a topic of an action: `navigate_to_pose/_action/send_goal`."""
-    return f"{action}/{BELOW}/{part}"
+    return f"{action}{BELOW}{part}"
 
 
 def new_id() -> bytes:
@@ -372,7 +372,7 @@ def found_in(ends: Iterable[Endpoint]) -> list[Found]:
     marks = {("srv", SEND): "_SendGoal", ("sub", FEEDBACK): "_FeedbackMessage"}
     found = []
     for end in ends:
-        action, below, part = end.key.rpartition(f"/{BELOW}/")
+        action, below, part = end.key.rpartition(BELOW)
         mark = marks.get((end.kind, part))
         if below and mark and end.type.endswith(mark):
             found.append(Found(action, end.type.removesuffix(mark), end.node, end.session, end.kind == "srv"))

@@ -90,9 +90,7 @@ class Parameters:
     ) -> None:
         self._node, self._declared, self._report = node, declared, report
         self._lock = threading.Lock()  # no reads of a partly applied request
-        self._set_server = bus.serve(
-            f"{node}/set_parameters", r.SetParametersRequest, r.SetParametersReply, self._set
-        )  # fmt: skip
+        self._set_server = bus.serve(f"{node}/set_parameters", r.SetParametersRequest, r.SetParametersReply, self._set)
         self._servers: list[Server] = [
             self._set_server,
             bus.serve(f"{node}/get_parameters", r.GetParametersRequest, r.GetParametersReply, self._get),

@@ -10,6 +10,7 @@ import re
 
 from holozen.messages.definitions import Interface
 from holozen.messages.type_hash import type_hash
+from holozen.transport.actions import BELOW, FEEDBACK, SEND, key_of
 from holozen.transport.rmw_zenoh import KINDS, TOPIC, Attachment, Endpoint
 from holozen.transport.samples import Sample
 
@@ -18,7 +19,6 @@ LATCHED_QOS = ":1:1:0,1"  # transient local, the last one
 _TYPE = re.compile(r"[A-Za-z]\w*/(msg|srv|action)/[A-Za-z]\w*")
 _HASH = re.compile(r"typehash=(RIHS\d+_[0-9a-f]+)")
 ACTION_SERVER, ACTION_CLIENT = "AS", "AC"
-PART = "/_action/"  # between an action and a part of it
 _LENGTHS = {"MP": 7, "MS": 7, "SS": 6, ACTION_CLIENT: 6}  # chunks of the tokens that are read
 _CODES = {kind: code for code, kind in KINDS.items()}
 
@@ -42,7 +42,7 @@ class Form:
         hashed, latched = found[1] if found else "", qos.split(":")[2:3] == ["1"]
         node = f"bridge_{parts[1][:6]}"
         if code == ACTION_CLIENT:  # it reads the feedback
-            return Endpoint("sub", f"{topic}{PART}feedback", f"{type_name}_FeedbackMessage", "", node, parts[1])
+            return Endpoint("sub", key_of(topic, FEEDBACK), f"{type_name}_FeedbackMessage", "", node, parts[1])
         return Endpoint(KINDS[code], topic, type_name, hashed, node, parts[1], latched=latched)
 
     def key(self, endpoint: Endpoint) -> str:
@@ -56,10 +56,10 @@ class Form:
     def token(self, endpoint: Endpoint, node_number: int) -> str:
         """The key of its liveliness token; empty for a part of an action whose token another part has."""
         code, topic, type_name = _CODES[endpoint.kind], endpoint.topic, endpoint.type
-        if PART in topic:
+        if BELOW in topic:
             code, type_name = ACTION_SERVER, type_name.removesuffix("_SendGoal")
-            topic, _, part = topic.partition(PART)
-            if part != "send_goal":
+            topic, _, part = topic.partition(BELOW)
+            if part != SEND:
                 return ""
         start = f"@/{endpoint.session}/@ros2_lv/{code}"
         names = "/".join(name.replace("/", "§") for name in (topic, type_name))

@@ -64,7 +64,7 @@ FAILED = 4  # OPERATION_FAILED of simulation_interfaces/msg/Result
 SHARED = ("tf", "tf_static")  # topics with several publishers by nature
 DESCRIPTION, STRING = "robot_description", "std_msgs/msg/String"
 
-RESULT, STATUS = (f"/{actions.BELOW}/{part}" for part in (actions.RESULT, actions.STATUS))
+RESULT, STATUS = (actions.BELOW + part for part in (actions.RESULT, actions.STATUS))
 
 Ends = list[Callable[[], object]]
 
@@ -288,7 +288,7 @@ class Gateway:
         of an action are left out: a result takes longer than CALL.
         """
         interface = self._interface(theirs.type)
-        if not interface or interface.kind != "srv" or f"/{actions.BELOW}/" in theirs.topic:
+        if not interface or interface.kind != "srv" or actions.BELOW in theirs.topic:
             return False
         if why := self._form.mismatch(theirs, interface):
             return self._refuse(theirs.topic, why)

@@ -16,7 +16,7 @@ from holozen.ros.rclpy.qos import QoSProfile, qos_profile_action_status_default,
 from holozen.ros.rclpy.service import Service
 from holozen.ros.rclpy.task import Future
 from holozen.suggest import article
-from holozen.transport.actions import CANCEL, KEPT, RESULT, SEND, Goal, Goals, State
+from holozen.transport.actions import CANCEL, KEPT, RESULT, SEND, Goal, Goals, State, key_of
 
 __all__ = [
     "ActionServer", "CancelResponse", "GoalEvent", "GoalResponse", "ServerGoalHandle", "default_cancel_callback",
@@ -180,7 +180,7 @@ class ActionServer(HelpfulAttributes):
         self._node, self._handles = node, dict[bytes, ServerGoalHandle]()
         self.goals = Goals(node._holozen.bus, key(self.action_name), action_type, result_timeout)
         travels, group = action_type.Impl, callback_group or node.default_callback_group
-        sender = f"{self.action_name}/_action/{SEND}"
+        sender = key_of(self.action_name, SEND)
         self._goal_service = node._holozen.own(
             _GoalService(
                 node._holozen, travels.SendGoalService, node.resolve_service_name(sender), self._send_goal, group,
@@ -188,7 +188,7 @@ class ActionServer(HelpfulAttributes):
             )
         )  # fmt: skip
         self._services = [self._goal_service] + [
-            node.create_service(kind, f"{self.action_name}/_action/{part}", answer, callback_group=callback_group,
+            node.create_service(kind, key_of(self.action_name, part), answer, callback_group=callback_group,
                 qos_profile=profile)
             for part, kind, answer, profile in (
                 (CANCEL, travels.CancelGoalService, self._cancel_goal, cancel_service_qos_profile),
