@@ -16,7 +16,7 @@ from holozen.console import drain, give_up_readers
 _PR_SET_PDEATHSIG = 1  # prctl(2)
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 POLL = 0.5  # s
-INTERRUPTED = 130
+INTERRUPTED = 130  # the exit code after Ctrl-C, as of shells
 
 
 def stop_event() -> threading.Event:
@@ -74,8 +74,8 @@ class Ending:
     Zenoh's own threads run on after its sessions are closed. One that enters Python while the interpreter is being
     finalized aborts the process, and one that uses statics that the C library has destroyed by then panics
     (eclipse-zenoh/zenoh#1904). So the last callback of atexit ends the process. Callbacks run in the
-    reverse order of their registration: make the Ending before anything else registers one. `of_verb`: the process is
-    one of `holozen VERB`, which it ends with.
+    reverse order of their registration: make the Ending before anything else registers one. `of_verb`: the process runs
+    one `holozen VERB`, and ends with it.
     """
 
     of_verb = False
@@ -125,7 +125,9 @@ def quiet() -> Iterator[None]:
 
 
 def dies_with_parent() -> Callable[[], None]:
-    """For subprocess's `preexec_fn`: have the kernel end the child when this process is killed."""
+    """For subprocess's `preexec_fn`: have the kernel end the child when the thread that started it ends, at the latest
+    when this process is killed.
+    """
     import ctypes
 
     libc = ctypes.CDLL(None)  # here, and not in the child: an import between fork and exec may hang

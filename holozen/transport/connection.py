@@ -36,8 +36,8 @@ class Connection(NamedTuple):
     """Zenoh's flags, and how messages are encoded.
 
     `listen` and `connect`: None means the default, an empty tuple means no endpoint. The default is loopback, or with
-    `private` the Unix sockets in that folder; each `domain` has its own. `secure`: the folder of a member, whose
-    certificate it uses.
+    `private` the Unix sockets in that folder; each `domain` has its own. A peer listens at its `own_endpoint` as well.
+    `secure`: the folder of a member, whose certificate it uses.
     """
 
     mode: str = "peer"

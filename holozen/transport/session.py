@@ -27,7 +27,6 @@ MAX_TOKENS = 1 << 15  # that wait, of 240 bytes each, which Zenoh takes bit by b
 CLOSE_LIMIT = 0.15  # s; a session whose peer hangs would take 10 s to close
 SETTLED = 0.03  # s after opening, when a peer has the links to those it was told of (5 to 10 ms on an idle machine)
 
-
 FORKED = (
     "cannot use Zenoh in a process that was forked from one which has used it: start it by multiprocessing's "
     '"spawn" method, or fork before the first Bus'
@@ -152,7 +151,7 @@ def _open_listening(connection: Connection, config: zenoh.Config, mode: str, set
         except zenoh.ZError as error:
             used = next((one for one in listen if _is_taken(one, str(error))), None)
             if mode != "peer" or not used:
-                raise BusError(opening(error, mode, connection.where, None)) from None
+                raise BusError(open_failure(error, mode, connection.where, None)) from None
             listen.remove(used)
             taken.append(used)
             continue
@@ -204,7 +203,7 @@ def _open_client(
         if attempt.session:
             return attempt.session
         if not _may_recover(attempt.error) or (patience is not None and time.monotonic() - begin > patience):
-            raise BusError(opening(attempt.error, "client", connection.where, patience))
+            raise BusError(open_failure(attempt.error, "client", connection.where, patience))
         if stop.wait(0.05):
             raise SystemExit(0)
 
@@ -258,7 +257,7 @@ def _unreached(connection: Connection, config: zenoh.Config, patience: float) ->
     silent = [endpoint for endpoint, reason in reasons.items() if not reason]
     if silent:
         return unanswered(silent, patience)
-    return opening(Exception("Unable to connect"), "client", connection.where, patience)
+    return open_failure(Exception("Unable to connect"), "client", connection.where, patience)
 
 
 def linked(session: Any) -> bool:
@@ -355,7 +354,7 @@ def one_line(what: str) -> Iterator[None]:
         raise BusError(f"{what}: {reason(error)}") from None
 
 
-def opening(error: Exception, mode: str, where: str, patience: float | None) -> str:
+def open_failure(error: Exception, mode: str, where: str, patience: float | None) -> str:
     """Why a session could not be opened; `where` it looks for others."""
     text = reason(error)
     if mode == "client" and text.startswith(("Unable to connect", "No peer")):
