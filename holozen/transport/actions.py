@@ -315,11 +315,11 @@ class ActionServer(Goals):
                 return refuse(query, str(error))
         with self.lock:
             goal = self.get(identity)
-            if goal and goal.is_active and len(goal.waiting) < MAX_WAITING:
-                return goal.waiting.append(query)
-        if goal and goal.is_active:
-            with query:
-                return refuse(query, f"{MAX_WAITING} requests wait for the result of this goal already")
+            if goal and goal.is_active:
+                if len(goal.waiting) < MAX_WAITING:
+                    return goal.waiting.append(query)
+                with query:
+                    return refuse(query, f"{MAX_WAITING} requests wait for the result of this goal already")
         return self._reply(query, goal.result if goal else self._result_type())
 
     def _reply(self, query: Any, reply: Any) -> None:

@@ -23,7 +23,7 @@ from holozen.transport.errors import BusError
 from holozen.transport.graph import WITNESSED, Graph, Witness, peers
 
 LAST = 1.0  # s to wait for threads at the end of the process
-MAX_TOKENS = 1 << 15  # that wait, of 240 bytes each, which Zenoh takes bit by bit in a process's first hours
+MAX_TOKENS = 1 << 15  # that wait: 8 MB, which a process takes bit by bit in its first hours, as they come and go
 CLOSE_LIMIT = 0.15  # s; a session whose peer hangs would take 10 s to close
 SETTLED = 0.03  # s after opening, when a peer has the links to those it was told of (5 to 10 ms on an idle machine)
 
