@@ -62,8 +62,17 @@ class Form:
         return f"@ros2_lv/{self.domain}/**"
 
     def parse(self, token: str) -> Endpoint | None:
-        """See `parse`."""
-        return parse(token)
+        """The endpoint that a token names; None for that of a node, and for one that is malformed."""
+        parts = token.split("/")
+        if len(parts) != 13 or parts[0] != "@ros2_lv" or parts[5] not in KINDS or not _NUMBER.fullmatch(parts[4]):
+            return None
+        _, _, session, _, number, kind, _, space, node, topic, dds, hashed, qos = parts
+        found, topic = _TYPE.fullmatch(dds), topic.replace("%", "/").lstrip("/")
+        if not found or not TOPIC.fullmatch(topic):
+            return None
+        name = f"{space.replace('%', '/')}/{node}".strip("/").replace("//", "/")
+        latched = qos.split(":")[1:2] == ["1"]
+        return Endpoint(KINDS[kind], topic, "/".join(found.groups()), hashed, name, session, int(number), latched)
 
     def key(self, endpoint: Endpoint) -> str:
         """The key of its samples or requests."""
@@ -109,20 +118,6 @@ class Form:
     def writer(self, stamp: Attachment) -> str:
         """The session that must have a token for the sample's topic and type; empty, as the key states both."""
         return ""
-
-
-def parse(token: str) -> Endpoint | None:
-    """The endpoint that a token names; None for that of a node, and for one that is malformed."""
-    parts = token.split("/")
-    if len(parts) != 13 or parts[0] != "@ros2_lv" or parts[5] not in KINDS or not _NUMBER.fullmatch(parts[4]):
-        return None
-    _, _, session, _, number, kind, _, space, node, topic, dds, hashed, qos = parts
-    found, topic = _TYPE.fullmatch(dds), topic.replace("%", "/").lstrip("/")
-    if not found or not TOPIC.fullmatch(topic):
-        return None
-    name = f"{space.replace('%', '/')}/{node}".strip("/").replace("//", "/")
-    latched = qos.split(":")[1:2] == ["1"]
-    return Endpoint(KINDS[kind], topic, "/".join(found.groups()), hashed, name, session, int(number), latched)
 
 
 def dds_type(name: str) -> str:

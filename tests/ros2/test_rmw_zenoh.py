@@ -391,7 +391,7 @@ def test_another_attachment_is_none(wrong: bytes) -> None:
     ],
 )
 def test_a_token_that_names_no_endpoint_is_none(wrong: str) -> None:
-    assert rmw.parse(wrong) is None
+    assert rmw.Form(0).parse(wrong) is None
 
 
 def test_a_token_is_that_of_the_design() -> None:
@@ -400,7 +400,7 @@ def test_a_token_is_that_of_the_design() -> None:
         "@ros2_lv/2/aac3178e146ba6f1fc6e6a4085e77f21/0/10/MP/%/%/talker"
         "/%robot1%chatter/std_msgs::msg::dds_::String_/RIHS01_df/::,10:,:,:,,"
     )
-    endpoint = rmw.parse(token)
+    endpoint = rmw.Form(0).parse(token)
     assert endpoint == rmw.Endpoint(
         "pub", "robot1/chatter", "std_msgs/msg/String", "RIHS01_df", "talker", "aac3178e146ba6f1fc6e6a4085e77f21", 10
     )
