@@ -1,10 +1,10 @@
 """Vectors, rotations, velocities, poses and transforms."""
 
-import math
 from typing import Annotated
 
 from msgspec import Meta, field
 
+from holozen import rotation
 from holozen.messages.message import Message
 from holozen.messages.std_msgs import Header
 
@@ -33,10 +33,8 @@ class Quaternion(Message):
     w: float = 1.0
 
     def yaw(self) -> float:
-        """The rotation about z, in radians within (-pi, pi]."""
-        sine = 2.0 * (self.w * self.z + self.x * self.y)
-        cosine = 1.0 - 2.0 * (self.y * self.y + self.z * self.z)
-        return math.atan2(sine, cosine)
+        """The rotation about z, in radians from -pi to pi."""
+        return rotation.yaw((self.x, self.y, self.z, self.w))
 
 
 class Twist(Message):
