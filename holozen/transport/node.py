@@ -273,10 +273,8 @@ class Node:
         return lambda: bool(querier.matching_status.matching)
 
     def writers(self, key: str) -> RawSubscriber:
-        """A reader of a sample for each holozen publisher on `key` that exists, appears or disappears."""
-        tokens = f"@holozen/*/*/pub/*/*/*/{graphs.quoted(key)}"
-        live = self.session.liveliness()
-        return self._keep(RawSubscriber(live.declare_subscriber(tokens, zenoh.handlers.RingChannel(64), history=True)))
+        """Reads a sample for each holozen publisher on `key` that exists, appears or disappears. Raises BusError."""
+        return self._keep(RawSubscriber(tokens(self.session, f"@holozen/*/*/pub/*/*/*/{graphs.quoted(key)}", 64)))
 
     def ask_all(self, key: str, timeout: float, **request: Any) -> Replies:
         """Query all servers of `key`, ahead of other traffic."""
@@ -313,7 +311,7 @@ class Node:
             time.sleep(0.01)
 
     def graph(self, keys: str = graphs.ALL) -> Graph:
-        """The endpoints of all nodes, or those with tokens that match `keys`, kept up to date."""
+        """The endpoints of all nodes, or those with tokens that match `keys`, kept up to date. Raises BusError."""
         live, known = self.session.liveliness(), tokens(self.session, keys)
 
         def roll_call() -> bool:

@@ -304,7 +304,7 @@ class Dealer(Declared):
         self.ready: dict[Ring, None] = {}  # those that got something, in order; the reader takes them out
 
     def ring(self, key: str, depth: int) -> Ring:
-        """A ring for a key."""
+        """A ring for a key, which takes the place of an earlier one."""
         self._rings[key] = ring = Ring(self, key, depth)
         return ring
 

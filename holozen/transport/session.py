@@ -322,9 +322,10 @@ def witness(session: Any) -> Witness:
     return Witness(session, zenoh.handlers.RingChannel(16), graphs, known)
 
 
-def tokens(session: Any, keys: str) -> Any:
-    """A subscription to the tokens that match `keys`, those that exist included."""
-    return session.liveliness().declare_subscriber(keys, zenoh.handlers.RingChannel(MAX_TOKENS), history=True)
+def tokens(session: Any, keys: str, depth: int = MAX_TOKENS) -> Any:
+    """A subscription to the tokens that match `keys`, those that exist included. Raises BusError."""
+    with one_line(f"key {keys!r}"):
+        return session.liveliness().declare_subscriber(keys, zenoh.handlers.RingChannel(depth), history=True)
 
 
 def token_change(tokens: Any) -> tuple[str, bool] | None:

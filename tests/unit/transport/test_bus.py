@@ -158,7 +158,8 @@ def test_a_closed_bus_ends_its_readers_and_may_be_closed_again(wire: Wire) -> No
         lambda: publisher.matched, lambda: publisher.wanted,
     ]  # fmt: skip
     assert {refusal(use) for use in uses} == {"closed"}
-    assert "session closed" in refusal(lambda: bus.subscribe_raw("odom"))
+    for use in (lambda: bus.subscribe_raw("odom"), lambda: bus.writers("odom"), bus.graph):
+        assert "session closed" in refusal(use)
 
 
 WRONG_KEYS = ["", "/odom", "odom/", "a//b", "a?b", "a#b", "a$b", "**/**"]
