@@ -50,6 +50,7 @@ WITNESSES = 1.0  # s for the holders of meeting points to tell of robots and sim
 DEFINITION_WAIT = 0.5  # s for a node to be found that answers
 LAST_WAIT = 0.5  # s for publishers to answer with their last messages
 DEFINITION_TIMEOUT = 2.0  # s for its answer
+MAX_DEPTH = 1 << 24  # samples; Zenoh takes the memory for all of them at once, and without it aborts the process
 LONGEST_NAME = 255  # characters of a node's name, as in ROS
 _NAME = re.compile(r"[\w.-]+(?:[ /][\w.-]+)*")
 
@@ -250,7 +251,9 @@ class Node:
             return self.session.liveliness().declare_token(graphs.token(endpoint))
 
     def subscribe_raw(self, key: str, depth: int = 1024, limit: int = 0) -> RawSubscriber:
-        """A reader of bytes on any key expression. Raises BusError if it is not valid."""
+        """A reader of bytes on any key expression that keeps the newest `depth`. Raises BusError if either is wrong."""
+        if not (isinstance(depth, int) and 0 < depth <= MAX_DEPTH):
+            raise BusError(f"key {key!r}: depth {depth!r}: use 1 to {MAX_DEPTH}")
         with one_line(f"key {key!r}"):
             subscriber = self.session.declare_subscriber(key, zenoh.handlers.RingChannel(depth))
         return self._keep(RawSubscriber(subscriber, limit))

@@ -208,6 +208,8 @@ def test_wrong_arguments_are_named_with_what_is_allowed(wire: Wire) -> None:
         (BusError, lambda: ask(TriggerRequest(), TriggerReply, float("nan")), "timeout nan: use 0 to 1e[+]09 s"),
         (BusError, lambda: ask(TriggerRequest(), TriggerReply, float("inf")), "timeout inf: use 0 to 1e[+]09 s"),
         (BusError, lambda: ask(TriggerRequest(), TriggerReply, "1"), "timeout '1': use 0 to 1e[+]09 s"),
+        (BusError, lambda: bus.subscribe("odom", Twist, depth=0), "key 'odom': depth 0: use 1 to 16777216"),
+        (BusError, lambda: bus.subscribe_raw("odom", 10**9), "key 'odom': depth 1000000000: use 1 to 16777216"),
         (TypeError, lambda: bus.publisher("odom", dict), "'odom': dict is not the class of a message"),
         (TypeError, lambda: bus.publisher("odom", TriggerReply()), "'odom': TriggerReply(.*) is not the class of"),
         (TypeError, lambda: bus.publisher(5, Twist), "key '5': give a text"),
