@@ -148,14 +148,17 @@ def nodes(connection: Connection) -> Iterator[Finding]:
 
     if connection.mode == "peer" and not connection.config:
         connection = connection._replace(listen=(connection.own_endpoint,))  # leave the meeting points to others
+    if connection.secure:  # first, since without its own no router answers
+        from holozen.transport.members import warnings  # loads cryptography
+
+        for warning in warnings(connection.secure):
+            text, _, fix = warning.partition("; ")
+            yield Finding("network", WARNING, text, fix)
     with Bus("doctor", connection, patience=OPEN) as bus:
         endpoints = bus.graph().settled(bus.connected, patience=FIND)
         began = time.monotonic()
         robots = Robots(bus, endpoints)
         yield from meeting_points(connection, bus.connected())
-        if bus.member and (warning := bus.member.warning()):
-            text, _, fix = warning.partition("; ")
-            yield Finding("network", WARNING, text, fix)
         peers = ask_peers(bus) if bus.connected() else {}
         yield from versions(endpoints, peers, version("holozen"))
         yield from hidden(bus.hidden() if bus.connected() else ())

@@ -6,6 +6,7 @@ stamp, encoding and payload. The router's access control cannot replace it: it k
 command from the router does not see its sender's certificate.
 """
 
+import contextlib
 import datetime
 import json
 import math
@@ -38,11 +39,7 @@ class Member(NamedTuple):
 
     def warning(self) -> str:
         """A warning of a certificate that expires soon; else empty."""
-        if self.expires > time.time() + RENEWAL:
-            return ""
-        end = datetime.datetime.fromtimestamp(self.expires, datetime.UTC)
-        expires = f"the certificate of {self.name} expires on {end:%Y-%m-%d %H:%M} UTC"
-        return f"{expires}; `holozen secure renew` issues a new one"
+        return _warning(self.name, self.expires)
 
     def attachment(self, key: str, priority: str, stamp: bytes, encoding: str, payload: bytes) -> bytes:
         """The stamp and the proof that this member sent it."""
@@ -93,6 +90,27 @@ def read_members(folder: str) -> dict[str, dict[str, str]]:
         ) from None
     except (ValueError, TypeError, KeyError, AttributeError):
         raise BusError(f"{path}: it is not a list of members; `holozen secure` writes it") from None
+
+
+def warnings(folder: str) -> list[str]:
+    """Warnings of certificates that expire soon or have expired: that of the member of a folder, and, where that is
+    within an authority's, those of all its members. Raises BusError as `load`.
+    """
+    member, ends = load(folder), {}
+    with contextlib.suppress(BusError, ValueError):
+        rows = read_members(str(Path(folder).parent))
+        ends = {name: datetime.datetime.fromisoformat(row["expires"]).timestamp() for name, row in rows.items()}
+    return [*filter(None, (_warning(*each) for each in (ends | {member.name: member.expires}).items()))]
+
+
+def _warning(name: str, end: float) -> str:
+    """A warning that the certificate of a member expires soon or has expired, at `end` (s, Unix time); else empty."""
+    if end > (now := time.time()) + RENEWAL:
+        return ""
+    expires = "expires" if end > now else "expired"
+    date = datetime.datetime.fromtimestamp(end, datetime.UTC)
+    certificate = f"the certificate of {name} {expires} on {date:%Y-%m-%d %H:%M} UTC"
+    return f"{certificate}; `holozen secure renew` issues a new one"
 
 
 def version(folder: str) -> tuple[int, int]:

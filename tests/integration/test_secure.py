@@ -13,7 +13,7 @@ import zenoh
 from cryptography import x509
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-from holozen import authority, cli, entities
+from holozen import authority, cli, doctor, entities
 from holozen.authority import AuthorityError
 from holozen.bus import Bus, Publisher
 from holozen.messages import (
@@ -365,6 +365,10 @@ def test_without_a_valid_certificate_no_node_gets_in_and_no_router_goes_on(fleet
     assert starts[1::2] == 3 * [f"router: listens at {listen[1]}"], router.err
     assert all(line.startswith("router: the certificate of router expires on ") for line in starts[::2]), router.err
     assert "the certificate of router expired on" in last
+    found = doctor.nodes(Connection("client", connect=listen[1:], secure=str(tmp_path / "brief" / "viewer")))
+    ends = [next(found).text.partition(" on ")[0] for _ in range(6)]
+    others = ("router", "sim", "operator", "autopilot", "script")
+    assert {*ends} == {"the certificate of viewer expires", *(f"the certificate of {name} expired" for name in others)}
 
 
 def test_a_certificate_of_another_authority_is_refused_in_one_line(fleet: Fleet, tmp_path: Path) -> None:
