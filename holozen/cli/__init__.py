@@ -5,6 +5,7 @@ import importlib
 import os
 import signal
 import sys
+import time
 from types import ModuleType
 from typing import Any
 
@@ -89,6 +90,9 @@ SERVICE_VERBS = {"sim": dict.fromkeys(("pause", "play", "step", "reset"), "simul
 """Service -> verbs that may follow its name -> their modules."""
 
 
+began = 0.0  # s, monotonic: when the verb was called, before it was loaded, which may take long
+
+
 def main(argv: list[str] | None = None) -> int:
     """Run one verb; returns the exit code (0 good, 1 failed, 2 wrong usage). Without `argv` it ends the process."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
@@ -144,6 +148,8 @@ def _drop_output() -> None:
 
 
 def _main(words: list[str]) -> int:
+    global began
+    began = time.monotonic()
     if not words or words[0] in ("-h", "--help"):
         print(_help())
         return 0 if words else 2

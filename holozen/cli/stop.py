@@ -5,6 +5,7 @@ import json
 import time
 from typing import TYPE_CHECKING
 
+from holozen import cli
 from holozen.bus import Bus
 from holozen.cli.verb import Verb, by_name
 from holozen.console import Failure, printable, report
@@ -33,10 +34,10 @@ NOTICE = 2.0  # s to discover the first robot, and those named on the command li
 
 def run(args: argparse.Namespace) -> int:
     """Stop or release robots; 0 only if all of them confirmed."""
-    began, where = time.monotonic(), connection.from_arguments(args)
+    where = connection.from_arguments(args)
     try:
         with Bus(args.verb, where, patience=args.timeout) as bus:
-            orders = Orders(bus, args, began)
+            orders = Orders(bus, args, cli.began)
             orders.give()
             connected = bus.connected()
             code = orders.report()

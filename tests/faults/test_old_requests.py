@@ -1,6 +1,7 @@
 """A request that would let a robot move, and waited in a link while somebody stopped it, does not end the stop."""
 
 import json
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -8,6 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import pytest
 
+from holozen import cli
 from holozen.bus import Bus
 from holozen.messages import CommandStatus, PoseStamped, TriggerReply, TriggerRequest, Twist
 from holozen.messages import simulation_interfaces as si
@@ -21,6 +23,7 @@ from holozen.transport.services import SIMULTANEOUS, call_bytes
 from .proxy import Proxy
 
 LONG = 60.0  # s that a caller waits
+Call = Callable[..., subprocess.CompletedProcess[str]]
 AGAIN = "; send it again if that is still to end"
 
 
@@ -170,7 +173,7 @@ def test_a_stop_that_waited_in_a_link_stops_the_robot(sim: Bus, far: Bus, proxy:
 
 
 def test_holozen_release_that_was_begun_before_a_stop_leaves_the_robot_stopped(
-    wire: Wire, sim: Bus, proxy: Proxy
+    wire: Wire, sim: Bus, proxy: Proxy, call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     trigger(sim, "stop")
     proxy.stall()
@@ -185,4 +188,13 @@ def test_holozen_release_that_was_begun_before_a_stop_leaves_the_robot_stopped(
     assert release.out == ""
     why = f"this release may have been sent before the last stop of the robot{AGAIN}"
     assert f"holozen release: hb_bot is not released: {why}" in release.err
+    load = cli.command
+
+    def load_slowly(verb: str) -> object:
+        pass_time()
+        trigger(sim, "stop")
+        return load(verb)
+
+    monkeypatch.setattr(cli, "command", load_slowly)
+    assert f"holozen release: hb_bot is not released: {why}" in call("release", *wire.flags).stderr
     assert wire.run("release").returncode == 0
