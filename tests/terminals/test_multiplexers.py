@@ -123,8 +123,9 @@ def test_a_latched_robot_stands_while_the_line_to_its_operator_hangs(
         assert_nothing_moves(robot)
     finally:
         window.process.signal(signal.SIGCONT)
-    # The second where the multiplexer itself answered too late, the third where odom did.
-    reasons = ("press it again", "press a key to drive", "press a key again to drive")
+    # The second where the multiplexer itself answered too late, the third where odom did, the last where the teleop was
+    # held up.
+    reasons = ("press it again", "press a key to drive", "press a key again to drive", "paused:")
     wait_for(lambda: any(reason in window.screen() for reason in reasons), what=lambda: f"either in {window.screen()}")
     drive(window, robot, "i", x=0.5)
     window.type("\x03")
