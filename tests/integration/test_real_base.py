@@ -100,6 +100,11 @@ class Kiwi:
         wait_for(lambda: commands.put(forward) or self.speeds() != STANDS)
 
 
+def said(base: Process) -> list[str]:
+    """The lines of its errors, without those on commands that a busy machine has delivered late."""
+    return [line for line in base.err.splitlines() if not re.match(r"cmd_vel: from \S+: late: ", line)]
+
+
 @pytest.fixture(scope="module")
 def kiwi(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Kiwi]:
     with Wire() as wire:
@@ -208,7 +213,7 @@ def test_it_ends_in_one_line_without_its_guard_which_no_other_signal_ends(number
         (guard,) = set(own.processes()) - {own.base.pid}
     os.kill(guard, number)
     assert own.base.wait() == 1
-    assert own.base.err.splitlines()[1:] == [
+    assert said(own.base)[1:] == [
         f"lekiwi: the guard that stops the wheels, process {guard}, has ended or hangs; start lekiwi.py again"
     ]
     wait_for(lambda: own.speeds() == STANDS, what="the wheels to stop")
@@ -400,7 +405,7 @@ def test_the_documented_program_stops_its_wheels_whatever_ends_it(
         if "KeyError" in fault:
             assert reason in base.err
         else:
-            assert base.err.splitlines() == [f"my_base: {reason}"]
+            assert said(base) == [f"my_base: {reason}"]
 
 
 def test_a_port_without_servos_is_reported_in_one_line(wire: Wire) -> None:
