@@ -142,7 +142,7 @@ def test_a_resume_from_before_a_person_drove_leaves_the_autopilot_held(sim: Bus,
 
     def drive() -> None:
         wait_for(lambda: obeys(sim.source, Twist.planar(0.1)))
-        person.put(Twist())
+        wait_for(lambda: obeys(sim.source, Twist()) and (now := status.read()[0]) and now.commanded == Twist())
 
     trigger(far, "resume")
     refused = held_up(proxy, lambda: trigger(far, "resume"), drive)
