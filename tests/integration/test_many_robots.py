@@ -8,6 +8,7 @@ import pytest
 from holozen import data
 from holozen.messages import JointState, TFMessage
 from holozen.testing import Process, Wire, wait_for
+from holozen.testing.process import run
 from holozen.testing.wire import command
 from tests.faults.proxy import Proxy
 
@@ -141,7 +142,8 @@ def test_a_second_sim_only_joins_with_named_robots_and_then_both_are_one_world_t
         (["--join"], "name the robots: holozen sim --join --robot FILE=NAME"),
         (["--join", "--robot", f"{BOT}=Ann", "--robot", str(BOT)], "name the robots: "),
     ]:
-        done = wire.run("sim", *words)
+        # A new Python: without --join a sim learns of others while its engine loads, and a forked one has loaded it.
+        done = run(command("sim", *words, *wire.flags), is_new=True)
         assert_one_line(done, 1, "sim: sim@", f" simulates here already; {why}")
     with Proxy(wire.port) as link:  # a slow one: what it joins is discovered late
         link.set(delay=0.2)
