@@ -1,5 +1,6 @@
-"""Round trip of a command from a ROS 2 node on DDS: cmd_vel (Twist) there, odom (Odometry) back, over `holozen ros2`
-and zenoh-bridge-ros2dds, against the same from a process on our bus; and the processor time that those two take.
+"""Round trip of a command from a ROS 2 node on DDS: cmd_vel (Twist) there, odom (Odometry) back,
+over `holozen ros2` and zenoh-bridge-ros2dds, against the same from a process on our bus; and the
+processor time that those two take.
 """
 
 import json
@@ -28,21 +29,28 @@ def bridged(endpoint: str, folder: str) -> Iterator[tuple[Trip, list[Process]]]:
     """The pilot's side on DDS, and the two processes in between: the gateway and the bridge."""
     from cyclonedds.util import duration
 
-    from tests.ros2 import dds
+    from tests.extensions.ros.gateway import dds
 
     domain, port = dds.loopback(), free_port()
     config = {
-        "mode": "router", "listen": {"endpoints": [f"tcp/127.0.0.1:{port}"]},
-        "scouting": {"multicast": {"enabled": False}}, "plugins": {"ros2dds": {"domain": domain}},
-    }  # fmt: skip
+        "mode": "router",
+        "listen": {"endpoints": [f"tcp/127.0.0.1:{port}"]},
+        "scouting": {"multicast": {"enabled": False}},
+        "plugins": {"ros2dds": {"domain": domain}},
+    }
     file = Path(folder, "bridge.json5")
     file.write_text(json.dumps(config))
-    program = subprocess.run([ROOT / "scripts/bridge"], stdout=subprocess.PIPE, text=True, check=True).stdout.strip()
+    program = subprocess.run(
+        [ROOT / "scripts/bridge"], stdout=subprocess.PIPE, text=True, check=True
+    ).stdout.strip()
     flags = ["--connect", endpoint, "--listen", meeting_point()]
     gateway = Process([*command("ros2", "--bridge", f"tcp/127.0.0.1:{port}"), *flags])
     with Process([program, "--config", str(file)], env={"ROS_DISTRO": "jazzy"}) as bridge, gateway:
         node = dds.Node(domain, "pilot")
-        odom, commands = node.subscriber("/odom", Odometry.ROS), node.publisher("/cmd_vel", Twist.ROS)
+        odom, commands = (
+            node.subscriber("/odom", Odometry.ROS),
+            node.publisher("/cmd_vel", Twist.ROS),
+        )
         vector = dds.dds_type("geometry_msgs/msg/Vector3")
         linear, angular = (vector(one.x, one.y, one.z) for one in (COMMAND.linear, COMMAND.angular))
         asked = dds.dds_type(Twist.ROS)(linear, angular)
@@ -70,15 +78,23 @@ def main() -> int:
     near, far = meeting_point(), meeting_point()
     turns, flat, paced, seconds = (2, 20, 5, 1.0) if args.quick else (20, 200, 25, 20.0)
     with (
-        beside(answer_ours, near), beside(answer_ours, far), ours(near) as direct,
-        tempfile.TemporaryDirectory() as folder, bridged(far, folder) as (trip, between),
-    ):  # fmt: skip
+        beside(answer_ours, near),
+        beside(answer_ours, far),
+        ours(near) as direct,
+        tempfile.TemporaryDirectory() as folder,
+        bridged(far, folder) as (trip, between),
+    ):
         cases = []
-        for name, count, period in (("flat out", flat, 0.0), (f"paced at {RATE:g} Hz", paced, 1 / RATE)):
+        for name, count, period in (
+            ("flat out", flat, 0.0),
+            (f"paced at {RATE:g} Hz", paced, 1 / RATE),
+        ):
             there, here = (partial(timed, one, count, period) for one in (trip, direct))
             cases.append(Case(name, "us").take_turns(turns, bridge=there, direct=here))
         gateway, bridge = share(trip, between, seconds)
-    print(f"at {RATE:g} Hz: `holozen ros2` takes {gateway:.1f} % of a core, the bridge {bridge:.1f} %")
+    print(
+        f"at {RATE:g} Hz: `holozen ros2` takes {gateway:.1f} % of a core, the bridge {bridge:.1f} %"
+    )
     publish("bridge", cases, args.json, gateway_percent=gateway, bridge_percent=bridge)
     return 0
 

@@ -1,6 +1,8 @@
-"""The command line: from process start to the first line, each verb's whole time, an echo's work, decoding.
+"""The command line: from process start to the first line, each verb's whole time, an echo's work,
+decoding.
 
-Beside raw zenoh (a subscriber of ten lines) and `zenoh`, the command of the package zenoh-cli, in the same interpreter.
+Beside raw zenoh (a subscriber of ten lines) and `zenoh`, the command of the package zenoh-cli, in
+the same interpreter.
 """
 
 import json
@@ -36,10 +38,20 @@ WALL_AIM, CPU_AIM, DECODE_AIM = (
 )
 ZENOH = str(Path(sys.executable).with_name("zenoh"))
 VERBS = (
-    "topic list -t", "topic info odom", "topic info cmd_vel", "topic type odom", "topic find nav_msgs/msg/Odometry",
-    "topic pub cmd_vel {} --once", "service list", "service type resume", "service info resume", "service call resume",
-    "node list", "node info robot", "graph",
-)  # fmt: skip
+    "topic list -t",
+    "topic info odom",
+    "topic info cmd_vel",
+    "topic type odom",
+    "topic find nav_msgs/msg/Odometry",
+    "topic pub cmd_vel {} --once",
+    "service list",
+    "service type resume",
+    "service info resume",
+    "service call resume",
+    "node list",
+    "node info robot",
+    "graph",
+)
 RATE = 1000.0  # Hz of the odom that is echoed
 BATCH = 2000  # messages that are decoded for one sample
 
@@ -56,7 +68,9 @@ def company(endpoint: str, rate: float) -> None:
 @contextmanager
 def sim(endpoint: str) -> Iterator[None]:
     """Within this block a sim with its default robot runs."""
-    with subprocess.Popen([HOLOZEN, "sim", *meet_at(endpoint)], cwd=ROOT, stderr=subprocess.DEVNULL) as process:
+    with subprocess.Popen(
+        [HOLOZEN, "sim", *meet_at(endpoint)], cwd=ROOT, stderr=subprocess.DEVNULL
+    ) as process:
         try:
             yield
         finally:
@@ -81,23 +95,31 @@ def verbs(turns: int, timed: Sequence[str] = VERBS) -> list[Case]:
 
         def ours(verb: str) -> Callable[[], list[float]]:
             # A publisher of commands waits for the sim's status.
-            return lambda: wall(HOLOZEN, *verb.split(), *meet_at(driven if " pub " in verb else looked_at))
+            return lambda: wall(
+                HOLOZEN, *verb.split(), *meet_at(driven if " pub " in verb else looked_at)
+            )
 
         def floor() -> list[float]:
-            return wall(sys.executable, str(ROOT / "benchmarks" / "raw_zenoh.py"), "open", looked_at)
+            return wall(
+                sys.executable, str(ROOT / "benchmarks" / "raw_zenoh.py"), "open", looked_at
+            )
 
         def alone() -> list[float]:
             return wall(sys.executable, "-c", "print('up')")
 
         return [
-            Case(verb, "ms", WALL_AIM).take_turns(turns, holozen=ours(verb), raw_zenoh=floor, python_alone=alone)
+            Case(verb, "ms", WALL_AIM).take_turns(
+                turns, holozen=ours(verb), raw_zenoh=floor, python_alone=alone
+            )
             for verb in timed
         ]
 
 
 def work(seconds: float, *words: str) -> list[float]:
     """Microseconds of processor time of an echo for each message, without its start."""
-    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+    with subprocess.Popen(
+        words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    ) as process:
         assert process.stdout
         reader = process.stdout.fileno()
         assert os.read(reader, 1), f"nothing from: {' '.join(words)}"
@@ -115,17 +137,24 @@ def echoing(turns: int, seconds: float) -> Case:
     at = ("--connect", endpoint, "--listen", LOOPBACK)  # it cannot listen where another one does
     with beside(company, endpoint, RATE):
         wait_for_odom(endpoint)
-        # zenoh-cli prints a line for each message, so the comparison is with --json; text takes 60 lines.
+        # zenoh-cli prints a line for each message, so the comparison is with --json; text takes 60
+        # lines.
         return Case("echo odom at 1 kHz, work", "us/msg", CPU_AIM).take_turns(
             turns,
-            holozen_json=lambda: work(seconds, HOLOZEN, "topic", "echo", "odom", "--json", *meet_at(endpoint)),
-            zenoh_cli_json=lambda: work(seconds, ZENOH, *at, "subscribe", "-k", "odom", "--decoder", "json"),
-            holozen_text=lambda: work(seconds, HOLOZEN, "topic", "echo", "odom", *meet_at(endpoint)),
+            holozen_json=lambda: work(
+                seconds, HOLOZEN, "topic", "echo", "odom", "--json", *meet_at(endpoint)
+            ),
+            zenoh_cli_json=lambda: work(
+                seconds, ZENOH, *at, "subscribe", "-k", "odom", "--decoder", "json"
+            ),
+            holozen_text=lambda: work(
+                seconds, HOLOZEN, "topic", "echo", "odom", *meet_at(endpoint)
+            ),
         )
 
 
 def decoding(turns: int) -> list[Case]:
-    """An Odometry from bytes, in JSON, msgpack and CDR, beside json.loads of the same message."""
+    """An Odometry from bytes, in JSON and CDR, beside json.loads of the same message."""
     plain = codec.encode(ODOM)
 
     def ours(wire: str) -> Callable[[], list[float]]:
@@ -152,9 +181,14 @@ def loaded() -> list[str]:
     endpoint = meeting_point()
     with beside(company, endpoint, 50.0):
         wait_for_odom(endpoint)
-        code = "import sys; from holozen.cli import main; main(sys.argv[1:]); print(*sys.modules, file=sys.stderr)"
+        code = (
+            "import sys; from holozen.cli import main; main(sys.argv[1:]); print(*sys.modules, "
+            "file=sys.stderr)"
+        )
         words = [sys.executable, "-c", code, "topic", "echo", "odom", "--once", *meet_at(endpoint)]
-        return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stderr.split()
+        return subprocess.run(
+            words, cwd=ROOT, capture_output=True, text=True, check=True
+        ).stderr.split()
 
 
 def main() -> int:
@@ -166,7 +200,10 @@ def main() -> int:
     modules = loaded()
     publish("cli", cases, args.json, loaded_by_echo=modules)
     heavy = {"numpy", "prompt_toolkit", "pybullet", "rich", "msgspec"} & set(modules)
-    print(f"an echo loads {len(modules)} modules; of the heavy ones: {', '.join(sorted(heavy)) or 'none'}")
+    print(
+        f"an echo loads {len(modules)} modules; of the heavy ones: "
+        f"{', '.join(sorted(heavy)) or 'none'}"
+    )
     return 0
 
 

@@ -3,6 +3,7 @@
 import compileall
 import multiprocessing
 import os
+import shutil
 import socket
 import sys
 import threading
@@ -18,7 +19,23 @@ from holozen.transport.connection import Connection
 
 PATIENCE = 60.0  # s for the other process to come up
 ROOT = Path(__file__).resolve().parents[1]
+WITHOUT_CARD = (
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+)
 HOLOZEN = str(Path(sys.executable).with_name("holozen"))
+
+
+def chromium(playwright: Any) -> Any:
+    """Debian's Chromium, which draws without a graphics card."""
+    return playwright.chromium.launch(executable_path=shutil.which("chromium"), args=WITHOUT_CARD)
+
+
+def page_address(printed: str) -> str:
+    """The address of its page, which a view has printed."""
+    return next(word for word in printed.split() if word.startswith("http://"))
 
 
 def meeting_point() -> str:
@@ -29,8 +46,8 @@ def meeting_point() -> str:
 
 
 def host(endpoint: str) -> Connection:
-    """The connection of a peer that listens at `endpoint`."""
-    return Connection(connect=(), listen=(endpoint,))
+    """The connection of a peer that listens at `endpoint`, and is in the group of its port."""
+    return Connection(connect=(endpoint,), listen=(endpoint,))
 
 
 def guest(endpoint: str) -> Connection:
@@ -41,7 +58,9 @@ def guest(endpoint: str) -> Connection:
 @contextmanager
 def beside(job: Callable[..., None], *args: Any) -> Iterator[None]:
     """Within this block another process runs `job(*args)`, which never returns."""
-    process = multiprocessing.get_context("spawn").Process(target=_run, args=(job, *args), daemon=True)
+    process = multiprocessing.get_context("spawn").Process(
+        target=_run, args=(job, *args), daemon=True
+    )
     process.start()
     try:
         yield
@@ -51,28 +70,38 @@ def beside(job: Callable[..., None], *args: Any) -> Iterator[None]:
 
 
 def until(ready: Callable[[], object], every: float = 0.05) -> None:
-    """Wait until `ready()` is true, polled `every` seconds. AssertionError if the other process does not come up."""
+    """Wait until `ready()` is true, polled `every` seconds. AssertionError if the other process
+    does not come up.
+    """
     deadline = time.monotonic() + PATIENCE
     while not ready():
-        assert time.monotonic() < deadline, f"the other process did not come up within {PATIENCE:g} s"
+        assert time.monotonic() < deadline, (
+            f"the other process did not come up within {PATIENCE:g} s"
+        )
         time.sleep(every)
 
 
 def wait_for_odom(endpoint: str) -> None:
     """Wait until a robot publishes odom at `endpoint`."""
     with Bus("waits", guest(endpoint)) as bus:
-        assert bus.latest("odom", Odometry).wait(0, timeout=20), "the robot did not come up within 20 s"
+        assert bus.latest("odom", Odometry).wait(0, timeout=20), (
+            "the robot did not come up within 20 s"
+        )
 
 
 def processor_time(pid: int) -> float:
-    """The processor time (s) of a process so far, in all its threads: proc(5), fields 14 and 15 of stat."""
+    """The processor time (s) of a process so far, in all its threads: proc(5), fields 14 and 15 of
+    stat.
+    """
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def compile_tree() -> None:
-    """Make the byte code, which an installed package always has; without it half of a start is the compiler's."""
-    for folder in ("holozen", "services"):
+    """Make the byte code, which an installed package always has; without it half of a start is the
+    compiler's.
+    """
+    for folder in ("holozen", "services", "extensions"):
         compileall.compile_dir(ROOT / folder, quiet=2)
 
 

@@ -1,9 +1,10 @@
-"""Driven against commanded path: on omni wheels, as spheres or with real rollers, on mecanum and other wheels, and as
-planar_move.
+"""Driven against commanded path: on omni wheels, as spheres or with real rollers, on mecanum and
+other wheels, and as planar_move.
 
-Each drive starts from rest, settles, and is commanded for some seconds, on a level floor and on a ramp, with wheels of
-different friction. The commanded path is the closed form of the body-frame velocity, in the plane of the ground: the
-straight line or the arc that wheels without slip would drive.
+Each drive starts from rest, settles, and is commanded for some seconds, on a level floor and on a
+ramp, with wheels of different friction. The commanded path is the closed form of the body-frame
+velocity, in the plane of the ground: the straight line or the arc that wheels without slip would
+drive.
 """
 
 import math
@@ -19,7 +20,7 @@ from holozen.flags import ENGINES
 from holozen.kinematics import travelled
 from holozen.limits import STOP, Planar
 from holozen.plotting import Plane, Robot, draw
-from holozen.robot.loading import load
+from holozen.robot.files.loading import load
 from holozen.robot.model import Link, RobotModel, Shape, WorldSpec, driven
 from holozen.robot.model import Pose as Place
 from holozen.robot.rigid import lowest
@@ -38,7 +39,8 @@ ROBOTS = {
     "planar_move": HB_BOT,
 }
 TWO_SIDED = ("differential", "skid")
-SLIDES = ("omni", "omni_rollers", "mecanum_rollers")  # driven with each of FRICTIONS; the others as their file has it
+# driven with each of FRICTIONS; the others as their file has it
+SLIDES = ("omni", "omni_rollers", "mecanum_rollers")
 MOTIONS: dict[str, Planar] = {
     "straight": (0.3, 0.0, 0.0),
     "strafe": (0.0, 0.3, 0.0),
@@ -46,7 +48,9 @@ MOTIONS: dict[str, Planar] = {
     "spin": (0.0, 0.0, 0.8),
     "arc": (0.3, 0.0, 0.5),
 }
-"""m/s and rad/s in the body frame; hb_bot's wheels turn by at most 5 rad/s, which is 0.7 m/s at their rims."""
+"""m/s and rad/s in the body frame; hb_bot's wheels turn by at most 5 rad/s, which is 0.7 m/s at
+their rims.
+"""
 SLOPES = {"floor": 0.0, "ramp": 5.0}  # degrees, up along x
 FRICTIONS = (0.2, 0.5, 1.0)  # of the wheels on the ground
 SETTLES, SPEEDS_UP, LASTS = 0.5, 0.5, 4.0  # s
@@ -54,9 +58,9 @@ SETTLES, SPEEDS_UP, LASTS = 0.5, 0.5, 4.0  # s
 
 @dataclass(frozen=True)
 class Result:
-    """One drive. Once it has sped up, `error` is the distance between commanded and driven place at the end, in percent
-    of the way, and `aside` the largest distance between them at any time; `heading` is the heading error at the end;
-    `start` is the way that it lost while it sped up.
+    """One drive. Once it has sped up, `error` is the distance between commanded and driven place at
+    the end, in percent of the way, and `aside` the largest distance between them at any time;
+    `heading` is the heading error at the end; `start` is the way that it lost while it sped up.
     """
 
     engine: str
@@ -73,7 +77,12 @@ class Result:
 
     def row(self) -> tuple[str, ...]:
         mu = f"{self.mu:g}" if self.drive in SLIDES else "-"
-        figures = (f"{self.error:.2f} %", f"{self.aside:.1f} mm", f"{self.heading:+.2f}", f"{self.start:.1f}")
+        figures = (
+            f"{self.error:.2f} %",
+            f"{self.aside:.1f} mm",
+            f"{self.heading:+.2f}",
+            f"{self.start:.1f}",
+        )
         return self.engine, self.drive, self.ground, mu, self.motion, *figures
 
 
@@ -83,7 +92,9 @@ HEAD = ("engine", "drive", "ground", "mu", "motion", "error", "aside", "heading"
 def with_friction(model: RobotModel, mu: float) -> RobotModel:
     """The model with this friction on its wheels and rollers."""
     links = {
-        name: replace(link, surface=replace(link.surface, mu1=mu, mu2=mu)) if "wheel" in name else link
+        name: replace(link, surface=replace(link.surface, mu1=mu, mu2=mu))
+        if "wheel" in name
+        else link
         for name, link in model.links.items()
     }
     return replace(model, links=links)
@@ -92,7 +103,9 @@ def with_friction(model: RobotModel, mu: float) -> RobotModel:
 def sloped(degrees: float) -> RobotModel:
     """A plane through the origin that goes up along x."""
     shape = Shape("plane", (100.0, 100.0), Place(rpy=(0.0, -math.radians(degrees), 0.0)))
-    return RobotModel("ramp", "ramp", {"ramp": Link("ramp", None, (), (shape,))}, {}, None, static=True)
+    return RobotModel(
+        "ramp", "ramp", {"ramp": Link("ramp", None, (), (shape,))}, {}, None, static=True
+    )
 
 
 def drive(engine: str, name: str, ground: str, mu: float, motion: str, seconds: float) -> Result:
@@ -129,7 +142,9 @@ def drive(engine: str, name: str, ground: str, mu: float, motion: str, seconds: 
     lost = ahead(begin, velocity, SPEEDS_UP)
     turned = math.degrees(math.remainder(sped[2] - lost[2], math.tau))
     start = 1000 * math.dist(sped[:2], lost[:2]) if way else abs(turned)
-    error = 100 * gaps[-1] / way if way else 100 * abs(heading) / math.degrees(velocity[2] * seconds)
+    error = (
+        100 * gaps[-1] / way if way else 100 * abs(heading) / math.degrees(velocity[2] * seconds)
+    )
     every = slice(None, None, 8)
     paths = [[(x, y) for x, y, _ in path[every]] for path in (places, commanded)]
     return Result(engine, name, ground, mu, motion, error, 1000 * max(gaps), heading, start, *paths)
@@ -163,13 +178,18 @@ def plot(results: list[Result]) -> Iterator[str]:
 
 def main() -> None:
     made = parser("fidelity", (__doc__ or "").partition("\n")[0])
-    made.add_argument("--engine", choices=ENGINES, action="append", help="only this one; may be repeated")
+    made.add_argument(
+        "--engine", choices=ENGINES, action="append", help="only this one; may be repeated"
+    )
     args = made.parse_args()
     results = [result for engine in args.engine or ENGINES for result in drives(engine, args.quick)]
     show([HEAD, *(result.row() for result in results)])
     for line in plot(results):
         print(line)
-    print("aim: within 1 % of the way on its wheels, and within 0.1 % as planar_move, which is exact on the level")
+    print(
+        "aim: within 1 % of the way on its wheels, and within 0.1 % as planar_move, which is "
+        "exact on the level"
+    )
     write("fidelity", args.json, cases=[vars(result) for result in results])
 
 

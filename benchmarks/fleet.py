@@ -1,9 +1,11 @@
-"""A fleet of planar robots that drive, as fast as the loop goes: 1 to 1000 of them, with odom at 20 Hz of sim time.
+"""A fleet of planar robots that drive, as fast as the loop goes: 1 to 1000 of them, with odom at 20
+Hz of sim time.
 
-Another process commands each robot once a second of sim time, a third one subscribes to `*/odom`. Beside it, in turns,
-the bare engine steps the same bodies on the same ground. Time is processor time of all threads of the sim's process, so
-the real-time factor is that of one core. The last cases are a fleet in two processes against one: shards that are read,
-shards that are not, and bare engines, which show what the machine can give.
+Another process commands each robot once a second of sim time, a third one subscribes to `*/odom`.
+Beside it, in turns, the bare engine steps the same bodies on the same ground. Time is processor
+time of all threads of the sim's process, so the real-time factor is that of one core. The last
+cases are a fleet in two processes against one: shards that are read, shards that are not, and bare
+engines, which show what the machine can give.
 """
 
 import math
@@ -24,7 +26,7 @@ from benchmarks.report import Case, parser, publish
 from benchmarks.sim_loop import REST, ROBOT, WORLD, Stepper, repeated
 from holozen.bus import Bus
 from holozen.messages import Clock, Twist
-from holozen.robot.loading import load
+from holozen.robot.files.loading import load
 from holozen.robot.model import RobotModel
 from holozen.robot.rigid import lump
 from services.sim.entities import Entities
@@ -32,7 +34,10 @@ from services.sim.loop import Loop
 from services.sim.physics.engine import UPRIGHT
 from services.sim.physics.world import World
 
-AIM = "300 robots at 5 times real time on one core, 1000 at 1; a robot costs the same, 10 to 1000, within 1.5"
+AIM = (
+    "300 robots at 5 times real time on one core, 1000 at 1; a robot costs the same, 10 to "
+    "1000, within 1.5"
+)
 FLEETS = (1, 10, 100, 300, 1000)
 GRID = 2.0  # m between two robots; each drives a circle of 0.4 m, all in step
 COMMAND = Twist.planar(0.2, 0.0, 0.5)
@@ -69,7 +74,9 @@ def watch(endpoint: str) -> None:
             odoms.recv()
 
 
-def fleet(bus: Bus, world: World, model: RobotModel, robots: int, first: int = 0) -> tuple[Entities, Stepper]:
+def fleet(
+    bus: Bus, world: World, model: RobotModel, robots: int, first: int = 0
+) -> tuple[Entities, Stepper]:
     """Our loop with `robots` copies of a robot on their keys, from bot`first` on."""
     entities = Entities(bus, world, (5.0, 10.0))
     for number, at in enumerate(places(robots), first):
@@ -79,7 +86,9 @@ def fleet(bus: Bus, world: World, model: RobotModel, robots: int, first: int = 0
 
 
 def bare(model: RobotModel, robots: int) -> Stepper:
-    """The same bodies, and nothing but steps. In a world that is not quite level they keep their contacts."""
+    """The same bodies, and nothing but steps. In a world that is not quite level they keep their
+    contacts.
+    """
     world, body = World(replace(WORLD, gravity=(1e-9, 0.0, WORLD.gravity[2]))), lump(model)
     for at in places(robots):
         world.add(body, at)
@@ -114,13 +123,18 @@ def measure(robots: int, turns: int, steps: int) -> tuple[Case, dict[str, float]
 
             def driving() -> bool:
                 ours(12)
-                return all(robot.arbiter.driver(time.monotonic()) for robot in entities.robots)
+                return all(
+                    robot.commands.arbiters.base.driver(time.monotonic())
+                    for robot in entities.robots
+                )
 
             until(driving, every=0)
             other = bare(model, robots)
             other(SETTLING)
             case = Case(f"{robots} robots", "us a robot and step", AIM).take_turns(
-                turns, holozen=lambda: timed(ours, steps, robots), bare_engine=lambda: timed(other, steps, robots)
+                turns,
+                holozen=lambda: timed(ours, steps, robots),
+                bare_engine=lambda: timed(other, steps, robots),
             )
     cost = case.sides()["holozen"]["p50"]
     return case, {
@@ -136,7 +150,9 @@ Share = tuple[int, int, float]
 
 
 def counted(step: Stepper, share: Share, together: Any, results: Any) -> None:
-    """Step a share once all are `together`; the steps of its robots in a second of real time go into `results`."""
+    """Step a share once all are `together`; the steps of its robots in a second of real time go
+    into `results`.
+    """
     robots, _, seconds = share
     step(SETTLING)
     together.wait()
@@ -154,7 +170,9 @@ def one_shard(endpoint: str, share: Share, together: Any, results: Any) -> None:
     with Bus("sim", guest(endpoint)) as bus, closing(World(WORLD)) as world:
         entities, step = fleet(bus, world, load(ROBOT), robots, first)
         for robot in entities.robots:
-            robot.arbiter.offer("benchmark", 4, (0.2, 0.0, 0.5), time.monotonic() + 1e6)
+            robot.commands.arbiters.base.offer(
+                "benchmark", 4, (0.2, 0.0, 0.5), time.monotonic() + 1e6
+            )
         counted(step, share, together, results)
 
 
@@ -164,7 +182,9 @@ def one_engine(_endpoint: str, share: Share, together: Any, results: Any) -> Non
 
 
 def side_by_side(job: Any, count: int, seconds: float, is_read: bool = True) -> list[float]:
-    """Microseconds of real time a robot and step, of a fleet in `count` processes at once, whose odometry `is_read`."""
+    """Microseconds of real time a robot and step, of a fleet in `count` processes at once, whose
+    odometry `is_read`.
+    """
     spawn, endpoint = multiprocessing.get_context("spawn"), meeting_point()
     results, together = spawn.Queue(), spawn.Barrier(count)
     with ExitStack() as sims, Bus("watcher", host(endpoint)) as bus:
@@ -180,7 +200,9 @@ def side_by_side(job: Any, count: int, seconds: float, is_read: bool = True) -> 
 
 
 def plot(fleets: list[dict[str, float]], cases: list[Case], file: Path) -> None:
-    """Plot the cost of a robot and step against the number of robots, beside that of the bare engine."""
+    """Plot the cost of a robot and step against the number of robots, beside that of the bare
+    engine.
+    """
     from matplotlib import pyplot
 
     figure, axes = pyplot.subplots(figsize=(6, 3.2))
@@ -197,7 +219,9 @@ def plot(fleets: list[dict[str, float]], cases: list[Case], file: Path) -> None:
 
 def main() -> int:
     flags = parser("fleet", __doc__)
-    flags.add_argument("--robots", type=int, nargs="+", default=FLEETS, metavar="N", help="how many (default: all)")
+    flags.add_argument(
+        "--robots", type=int, nargs="+", default=FLEETS, metavar="N", help="how many (default: all)"
+    )
     flags.add_argument("--plot", type=Path, metavar="FILE", help="draw the costs, as SVG or PNG")
     args = flags.parse_args()
     cases: list[Case] = []
@@ -207,7 +231,10 @@ def main() -> int:
         case, figures = measure(robots, turns, steps)
         cases.append(case)
         fleets.append(figures)
-        print(", ".join(f"{name.replace('_', ' ')} {value:.4g}" for name, value in figures.items()), flush=True)
+        print(
+            ", ".join(f"{name.replace('_', ' ')} {value:.4g}" for name, value in figures.items()),
+            flush=True,
+        )
     if args.plot:
         plot(fleets, cases, args.plot)
     seconds = 0.2 if args.quick else 3.0
@@ -217,7 +244,9 @@ def main() -> int:
         ("the same, unread", one_shard, False),
         ("the same in bare engines", one_engine, False),
     ):
-        case = Case(name, "us of real time a robot and step", "ratio of two processes to one <= 0.6")
+        case = Case(
+            name, "us of real time a robot and step", "ratio of two processes to one <= 0.6"
+        )
         two, one = (partial(side_by_side, job, count, seconds, is_read) for count in (2, 1))
         cases.append(case.take_turns(turns, two=two, one=one))
     publish("fleet", cases, args.json, fleets=fleets)

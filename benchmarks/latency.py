@@ -1,10 +1,13 @@
-"""Round trip of a command: cmd_vel (Twist) there, odom (Odometry) back, between two processes on loopback.
+"""Round trip of a command: cmd_vel (Twist) there, odom (Odometry) back, between two processes on
+loopback.
 
-Our bus, typed at both ends, against raw zenoh-python with the same bytes, the same settings and no types; and against
-the same with msgspec at both ends, which leaves what the bus adds: sender, number and time, the checks of a command.
+Our bus, typed at both ends, against raw zenoh-python with the same bytes, the same settings and no
+types; and against the same with msgspec at both ends, which leaves what the bus adds: sender,
+number and time, the checks of a command.
 """
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -30,6 +33,7 @@ from holozen.messages import (
     TwistWithCovariance,
     codec,
 )
+from holozen.transport.beat import PERIOD_NS, Beat
 from holozen.transport.connection import Connection
 from holozen.wire import MAX_COMMAND_BYTES
 
@@ -39,8 +43,13 @@ DEPTH = 64  # samples that a reader keeps, on both sides
 
 # Numbers with all their digits, as a robot that moves has them.
 COMMAND = Twist.planar(0.3141592653589793, -0.1234567890123456, 0.2718281828459045)
-VARIANCES = [1e-5 if i in (0, 7) else 1e-3 if i == 35 else 1e12 if i % 7 == 0 else 0.0 for i in range(36)]
-POSE = Pose(Point(1.2345678901234567, -0.9876543210987654, -0.0400123456789), Quaternion(0, 0, 0.3826834, 0.9238795))
+VARIANCES = [
+    1e-5 if i in (0, 7) else 1e-3 if i == 35 else 1e12 if i % 7 == 0 else 0.0 for i in range(36)
+]
+POSE = Pose(
+    Point(1.2345678901234567, -0.9876543210987654, -0.0400123456789),
+    Quaternion(0, 0, 0.3826834, 0.9238795),
+)
 ODOM = Odometry(
     Header(Time(12, 345_678_901), "odom"),
     "footprint_link",
@@ -56,11 +65,21 @@ Trip = Callable[[], object]
 def answer_ours(endpoint: str) -> None:
     """A robot on our bus."""
     with Bus("robot", host(endpoint)) as bus:
-        commands = bus.subscribe("cmd_vel", Twist, TwistStamped, depth=DEPTH, limit=MAX_COMMAND_BYTES)
+        commands = bus.subscribe(
+            "cmd_vel", Twist, TwistStamped, depth=DEPTH, limit=MAX_COMMAND_BYTES
+        )
         odom = bus.publisher("odom", Odometry)
+        threading.Thread(target=beat_on, args=(bus.beat(),), daemon=True).start()
         while True:
             assert commands.recv().message == COMMAND
             odom.put(ODOM)
+
+
+def beat_on(beat: Beat) -> None:
+    """Beat as a robot does, which sends nothing else while it waits."""
+    while True:
+        beat.poll()
+        time.sleep(PERIOD_NS * 1e-9)
 
 
 def answer_raw(endpoint: str) -> None:
@@ -157,7 +176,9 @@ def meet(send: Callable[[], None], try_recv: Callable[[], object]) -> None:
 
 
 def timed(trip: Trip, count: int, period: float = 0.0) -> list[float]:
-    """Microseconds of each of `count` round trips, one every `period` seconds (0: the next at once)."""
+    """Microseconds of each of `count` round trips, one every `period` seconds (0: the next at
+    once).
+    """
     times, due = [], time.perf_counter()
     for _ in range(count):
         due += period
@@ -169,7 +190,9 @@ def timed(trip: Trip, count: int, period: float = 0.0) -> list[float]:
     return times
 
 
-def compare(name: str, aim: str, trips: dict[str, Trip], turns: int, count: int, period: float = 0.0) -> Case:
+def compare(
+    name: str, aim: str, trips: dict[str, Trip], turns: int, count: int, period: float = 0.0
+) -> Case:
     """One case, `turns` rounds of `count` trips a side."""
     rounds = {side: partial(timed, trip, count, period) for side, trip in trips.items()}
     return Case(name, "us", aim).take_turns(turns, **rounds)
@@ -180,9 +203,13 @@ def main() -> int:
     a, b, c = meeting_point(), meeting_point(), meeting_point()
     turns, flat, paced = (2, 100, 5) if args.quick else (40, 500, 25)
     with (
-        beside(answer_ours, a), beside(answer_raw, b), beside(answer_typed, c),
-        ours(a) as bus, raw(b) as bare, typed(c) as bare_typed,
-    ):  # fmt: skip
+        beside(answer_ours, a),
+        beside(answer_raw, b),
+        beside(answer_typed, c),
+        ours(a) as bus,
+        raw(b) as bare,
+        typed(c) as bare_typed,
+    ):
         untyped = {"holozen": bus, "raw_zenoh": bare}
         with_msgspec = {"holozen": bus, "zenoh_and_msgspec": bare_typed}
         for sides in (untyped, with_msgspec):

@@ -1,5 +1,5 @@
-"""The least that a verb can do, in raw zenoh: `open ENDPOINT` opens, links and closes; `echo ENDPOINT` waits for the
-first sample of odom.
+"""The least that a verb can do, in raw zenoh: `open ENDPOINT` opens, links and closes; `echo
+ENDPOINT` waits for the first sample of odom.
 """
 
 import sys

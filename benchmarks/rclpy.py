@@ -1,6 +1,8 @@
-"""A script's callback on odom at 1 kHz: an rclpy node that spins, beside a plain subscriber of our bus.
+"""A script's callback on odom at 1 kHz: an rclpy node that spins, beside a plain subscriber of our
+bus.
 
-They take turns, each in a process of its own, with the same robot. Results are latency, processor time and losses.
+They take turns, each in a process of its own, with the same robot. Results are latency, processor
+time and losses.
 """
 
 import multiprocessing
@@ -18,13 +20,16 @@ from holozen.messages import Header, Odometry, Time
 
 AIM = "ratio <= 1.5, nothing lost"
 RATE = 1000.0  # Hz
-DEPTH = 100  # messages that wait: a busy machine may not run a process for some hundredths of a second
+# messages that wait: a busy machine may not run a process for some hundredths of a second
+DEPTH = 100
 FIRST = 200  # messages that do not count, while the two processes meet and caches fill
 
 Arrivals = list[tuple[float, int]]
 """The latency of each message in microseconds, and its number."""
 Result = tuple[list[float], float, int]
-"""The latencies in microseconds, the processor time in microseconds a message, and how many were lost."""
+"""The latencies in microseconds, the processor time in microseconds a message, and how many were
+lost.
+"""
 
 
 def robot(endpoint: str) -> None:
@@ -107,7 +112,9 @@ def in_a_process(job: Callable[[str, int], Result], endpoint: str, count: int) -
     return result
 
 
-def _send_result(pipe: "Pipe[Any, Any]", job: Callable[[str, int], Result], endpoint: str, count: int) -> None:
+def _send_result(
+    pipe: "Pipe[Any, Any]", job: Callable[[str, int], Result], endpoint: str, count: int
+) -> None:
     pipe.send(job(endpoint, count))
 
 

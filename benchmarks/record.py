@@ -1,7 +1,8 @@
 """`holozen record` of 50 topics at 100 Hz: is everything in the file, and how late was it recorded?
 
-The publisher is our bus in another process: typed Odometry with a number in each message. Messages that are missing in
-the file are counted by where they were lost. Nothing else records Zenoh keys into MCAP, so there is no comparison.
+The publisher is our bus in another process: typed Odometry with a number in each message. Messages
+that are missing in the file are counted by where they were lost. Nothing else records Zenoh keys
+into MCAP, so there is no comparison.
 """
 
 import json
@@ -17,13 +18,14 @@ from typing import Any
 from benchmarks.company import HOLOZEN, guest, host, meeting_point, until
 from benchmarks.latency import ODOM
 from benchmarks.report import Case, parser, publish
-from holozen.bag.reader import Bag
+from holozen.bags.reader import Bag
 from holozen.bus import Bus
 from holozen.messages import Odometry, Time, codec
 
 AIM = "every message that was received is in the file; what is missing is counted"
 TOPICS, RATE = 50, 100.0  # Hz
-# A publisher drops a message that waits for a millisecond; with more patience it is the recorder that is measured.
+# A publisher drops a message that waits for a millisecond; with more patience it is the recorder
+# that is measured.
 WAIT = ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "20000")  # us
 SECONDS, QUICK = 60.0, 1.0
 
@@ -35,7 +37,9 @@ def send(bus: Bus, seconds: float) -> int:
     due = time.monotonic()
     for count in range(round(seconds * RATE)):
         ODOM.child_frame_id = str(count)
-        for publisher in publishers:  # spread over the period, as robots are that know nothing of each other
+        for (
+            publisher
+        ) in publishers:  # spread over the period, as robots are that know nothing of each other
             ODOM.header.stamp = Time(*divmod(time.time_ns(), 10**9))
             publisher.put(ODOM)
             due += 1 / RATE / TOPICS
@@ -45,7 +49,9 @@ def send(bus: Bus, seconds: float) -> int:
 
 
 def record(seconds: float, folder: Path) -> tuple[int, dict[str, Any], Path, float]:
-    """Record while another process publishes: messages a topic, the recorder's last line, its file and its CPU s."""
+    """Record while another process publishes: messages a topic, the recorder's last line, its file
+    and its CPU s.
+    """
     endpoint = meeting_point()
     flags = guest(endpoint).arguments()
     words = [HOLOZEN, "record", "-a", "--json", "-o", str(folder / "bag"), *flags]

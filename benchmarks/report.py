@@ -18,7 +18,9 @@ HEAD = ("case", "side", "p50", "p99", "rounds' medians", "samples")
 
 
 class Figures(TypedDict):
-    """The figures of one side. `spread`: the 10th and the 90th percentile of its rounds' medians."""
+    """The figures of one side. `spread`: the 10th and the 90th percentile of its rounds'
+    medians.
+    """
 
     p50: float
     p99: float
@@ -28,9 +30,11 @@ class Figures(TypedDict):
 
 @dataclass
 class Case:
-    """One comparison. `rounds` are those of each side, each a list of times in `unit`; `aim` is the target in words.
+    """One comparison. `rounds` are those of each side, each a list of times in `unit`; `aim` is the
+    target in words.
 
-    The first side is ours. The ratio is that of its times to those of the second: below 1 is faster.
+    The first side is ours. The ratio is that of its times to those of the second: below 1 is
+    faster.
     """
 
     name: str
@@ -51,7 +55,9 @@ class Case:
         return {side.replace("_", " "): _figures(rounds) for side, rounds in self.rounds.items()}
 
     def ratio(self) -> tuple[float, tuple[float, float]] | None:
-        """Ours over the second side: the ratio of the medians, and the spread of the rounds' own ratios."""
+        """Ours over the second side: the ratio of the medians, and the spread of the rounds' own
+        ratios.
+        """
         if len(self.rounds) < 2:
             return None
         ours, other = list(self.rounds.values())[:2]
@@ -68,7 +74,12 @@ class Case:
 
     def as_json(self) -> dict[str, object]:
         """This case for the JSON file."""
-        row: dict[str, object] = {"case": self.name, "unit": self.unit, "aim": self.aim, "sides": self.sides()}
+        row: dict[str, object] = {
+            "case": self.name,
+            "unit": self.unit,
+            "aim": self.aim,
+            "sides": self.sides(),
+        }
         if ratio := self.ratio():
             row["ratio"] = {"of_medians": ratio[0], "spread": ratio[1]}
         return row
@@ -78,8 +89,16 @@ def parser(name: str, description: str | None) -> argparse.ArgumentParser:
     """The flags that every benchmark has."""
     made = argparse.ArgumentParser(prog=f"benchmarks/{name}.py", description=description)
     file = Path(__file__).with_name(f"{name}.json")
-    made.add_argument("--json", type=Path, default=file, metavar="FILE", help="where the figures go (default: beside)")
-    made.add_argument("--quick", action="store_true", help="a few seconds: shows that it runs, not how fast it is")
+    made.add_argument(
+        "--json",
+        type=Path,
+        default=file,
+        metavar="FILE",
+        help="where the figures go (default: beside)",
+    )
+    made.add_argument(
+        "--quick", action="store_true", help="a few seconds: shows that it runs, not how fast it is"
+    )
     return made
 
 
@@ -95,12 +114,18 @@ def show(rows: list[tuple[str, ...]]) -> None:
     """Print a table."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
-        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+        print(
+            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        )
 
 
 def write(name: str, file: Path, **figures: object) -> None:
     """Write figures as JSON, with the machine and its load."""
-    machine = {"cpus": os.cpu_count(), "system": platform.platform(), "python": platform.python_version()}
+    machine = {
+        "cpus": os.cpu_count(),
+        "system": platform.platform(),
+        "python": platform.python_version(),
+    }
     head = {"benchmark": name, "machine": machine, "load": os.getloadavg()}
     file.write_text(json.dumps(head | figures, indent=1) + "\n")
     print(f"figures: {file}")

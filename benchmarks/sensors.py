@@ -1,5 +1,6 @@
-"""What sensors cost a sim that keeps real time: a lidar of 360 rays and a camera of 640 x 480, both at 10 Hz, on one
-robot that is driven at 20 Hz. They are read, or not, in turns, in the same sim: without a reader, they are not made.
+"""What sensors cost a sim that keeps real time: a lidar of 360 rays and a camera of 640 x 480, both
+at 10 Hz, on one robot that is driven at 20 Hz. They are read, or not, in turns, in the same sim:
+without a reader, they are not made.
 """
 
 import sys
@@ -62,7 +63,9 @@ class Driven:
             time.sleep(PERIOD)
 
     def measure(self, name: str, keys: dict[str, type[Message]], seconds: float) -> list[float]:
-        """Milliseconds of the sim's processor time in a second of real time, while these are read."""
+        """Milliseconds of the sim's processor time in a second of real time, while these are
+        read.
+        """
         with read(self._bus, keys) as found:
             self.drive(0.5)
             for subscription in (self._statuses, self._times, *found.values()):
@@ -72,15 +75,25 @@ class Driven:
             self.drive(seconds)
             took = time.monotonic() - at
             cost = (processor_time(self._pid) - began) / took * 1000
-            self._report(name, took, {key: sum(1 for _ in iter(one.try_recv, None)) for key, one in found.items()})
+            self._report(
+                name,
+                took,
+                {key: sum(1 for _ in iter(one.try_recv, None)) for key, one in found.items()},
+            )
         return [cost]
 
     def _report(self, name: str, took: float, counts: dict[str, int]) -> None:
         statuses = [one.message for one in iter(self._statuses.try_recv, None) if one.message]
         times = [one.message for one in iter(self._times.try_recv, None) if one.message]
-        ages = sorted(source.delay * 1000 for status in statuses for source in status.sources if source.obeyed)
-        worst = self.figures.setdefault(name, {"command_age_p99_ms": 0.0, "overruns": 0.0, "real_time_factor": 1.0})
-        worst["command_age_p99_ms"] = max(worst["command_age_p99_ms"], ages[int(0.99 * (len(ages) - 1))])
+        ages = sorted(
+            source.delay * 1000 for status in statuses for source in status.sources if source.obeyed
+        )
+        worst = self.figures.setdefault(
+            name, {"command_age_p99_ms": 0.0, "overruns": 0.0, "real_time_factor": 1.0}
+        )
+        worst["command_age_p99_ms"] = max(
+            worst["command_age_p99_ms"], ages[int(0.99 * (len(ages) - 1))]
+        )
         worst["overruns"] += times[-1].overruns - times[0].overruns
         factor = (times[-1].time - times[0].time) / (took * (len(times) - 1) / len(times))
         worst["real_time_factor"] = min(worst["real_time_factor"], factor)
@@ -108,7 +121,10 @@ def main() -> int:
                 )
             )
     for name, figures in driven.figures.items():
-        print(f"{name}: " + ", ".join(f"{key.replace('_', ' ')} {value:.3g}" for key, value in figures.items()))
+        print(
+            f"{name}: "
+            + ", ".join(f"{key.replace('_', ' ')} {value:.3g}" for key, value in figures.items())
+        )
     publish("sensors", cases, args.json, figures=driven.figures)
     return 0
 

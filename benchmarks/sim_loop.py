@@ -1,7 +1,9 @@
-"""The sim's loop as fast as it goes, with commands and publishing, against a bare stepSimulation loop.
+"""The sim's loop as fast as it goes, with commands and publishing, against a bare stepSimulation
+loop.
 
-The bare engine steps the same robot as it loads it: four links, three joints. Ours is one body whose wheels turn only
-visually, so the engine alone with that body is measured too. --profile also prints where our time goes.
+The bare engine steps the same robot as it loads it: four links, three joints. Ours is one body
+whose wheels turn only visually, so the engine alone with that body is measured too. --profile also
+prints where our time goes.
 """
 
 import sys
@@ -22,10 +24,10 @@ from holozen import data
 from holozen.bus import Bus
 from holozen.command import inputs
 from holozen.messages import Twist
-from holozen.robot.loading import load
+from holozen.robot.files.loading import load
+from holozen.robot.files.sdf_world import load_world
+from holozen.robot.files.xacro import expand_xacro
 from holozen.robot.rigid import lump
-from holozen.robot.sdf_world import load_world
-from holozen.robot.xacro import expand_xacro
 from holozen.transport.pubsub import Publisher
 from services.sim.entities import Entities
 from services.sim.loop import Loop
@@ -33,6 +35,7 @@ from services.sim.physics.bullet import bullet
 from services.sim.physics.world import World
 from services.sim.robot import Robot
 from services.sim.spawn import spawn_all
+from services.sim.telemetry import Telemetry
 
 AIM = "ratio <= 0.6 (ours / bare engine)"
 ROBOT = data.find("urdf", "hb_bot.urdf.xacro")
@@ -61,7 +64,7 @@ PARTS = {
     "read: commands and requests": (Loop, "_read_inputs"),
     "move: read the body, set its velocity": (Robot, "move"),
     "step: the engine": (World, "step"),
-    "publish: odom, tf, joint_states": (Robot, "publish"),
+    "publish: odom, tf, joint_states": (Telemetry, "publish"),
     "of which encode and send, with the clock": (Publisher, "put"),
 }
 
@@ -79,7 +82,12 @@ def our_loop(bus: Bus) -> Stepper:
     """Our world with hb_bot on its keys, as `holozen sim --rtf 0` runs it."""
     world = World(WORLD)
     flags = Namespace(
-        robot=None, package=[], allow_env=[], drive="", max_linear=inputs.MAX_LINEAR, max_angular=inputs.MAX_ANGULAR
+        robot=None,
+        package=[],
+        allow_env=[],
+        drive="",
+        max_linear=inputs.MAX_LINEAR,
+        max_angular=inputs.MAX_ANGULAR,
     )
     entities = Entities(bus, world, (flags.max_linear, flags.max_angular))
     spawn_all(entities, flags)
@@ -98,17 +106,23 @@ def bare_loop() -> Stepper:
     """hb_bot's links and joints as the engine loads them, on a plane, and nothing but steps."""
     world = engine.connect(engine.DIRECT)
     engine.setGravity(*WORLD.gravity, physicsClientId=world)
-    engine.setPhysicsEngineParameter(fixedTimeStep=WORLD.step, deterministicOverlappingPairs=1, physicsClientId=world)
+    engine.setPhysicsEngineParameter(
+        fixedTimeStep=WORLD.step, deterministicOverlappingPairs=1, physicsClientId=world
+    )
     plane = engine.createCollisionShape(engine.GEOM_PLANE, physicsClientId=world)
     engine.createMultiBody(0, plane, physicsClientId=world)
     body = load_bare(world)
     for joint in range(engine.getNumJoints(body, physicsClientId=world)):
-        engine.setJointMotorControl2(body, joint, engine.VELOCITY_CONTROL, force=0, physicsClientId=world)
+        engine.setJointMotorControl2(
+            body, joint, engine.VELOCITY_CONTROL, force=0, physicsClientId=world
+        )
     return repeated(partial(engine.stepSimulation, world))
 
 
 def load_bare(world: int) -> int:
-    """hb_bot without what the engine cannot load: meshes for the eye, and a root without mass, which it makes 1 kg."""
+    """hb_bot without what the engine cannot load: meshes for the eye, and a root without mass,
+    which it makes 1 kg.
+    """
     robot = ElementTree.fromstring(expand_xacro(ROBOT))
     for part in robot.findall("link") + robot.findall("joint"):
         if part.get("name") in ("footprint_link", "footprint_joint"):
@@ -130,7 +144,9 @@ def timed(stepper: Stepper, steps: int) -> list[float]:
 
 
 def profile(ours: Stepper, steps: int) -> dict[str, float]:
-    """Microseconds of a step in each of PARTS, while a pilot commands. Measuring adds about 0.2 us to each call."""
+    """Microseconds of a step in each of PARTS, while a pilot commands. Measuring adds about 0.2 us
+    to each call.
+    """
     spent: Counter[str] = Counter()
     kept = {part: getattr(owner, name) for part, (owner, name) in PARTS.items()}
     for part, (owner, name) in PARTS.items():
@@ -173,7 +189,11 @@ def main() -> int:
         compare("warm up", sides, 1, steps)
         cases = [compare("idle", sides, turns, steps)]
         with beside(drive, endpoint):
-            assert bus.latest("cmd_vel", Twist).wait(0, timeout=10), "the pilot did not come up within 10 s"
+            pilot, deadline = bus.latest("cmd_vel", Twist), time.monotonic() + 10.0
+            # it commands once it has heard the sim's beat, which the loop sends
+            while not pilot.count:
+                assert time.monotonic() < deadline, "the pilot did not come up within 10 s"
+                sides[0](1)
             cases.append(compare("driving", sides, turns, steps))
             shares = profile(sides[0], steps * 5) if args.profile else {}
     for part, share in shares.items():

@@ -1,6 +1,8 @@
-"""From process start to the first line of `holozen topic echo odom`, and to the first odom of `holozen up`.
+"""From process start to the first line of `holozen topic echo odom`, and to the first odom of
+`holozen up`.
 
-The echo is compared with a raw zenoh subscriber of ten lines that prints its first sample, in the same interpreter.
+The echo is compared with a raw zenoh subscriber of ten lines that prints its first sample, in the
+same interpreter.
 """
 
 import subprocess
@@ -8,7 +10,15 @@ import sys
 import time
 from collections.abc import Sequence
 
-from benchmarks.company import HOLOZEN, ROOT, beside, compile_tree, host, meeting_point, wait_for_odom
+from benchmarks.company import (
+    HOLOZEN,
+    ROOT,
+    beside,
+    compile_tree,
+    host,
+    meeting_point,
+    wait_for_odom,
+)
 from benchmarks.latency import ODOM
 from benchmarks.report import Case, parser, publish
 from holozen.bus import Bus
@@ -52,7 +62,9 @@ def first_odom() -> list[float]:
         odom = bus.latest("odom", Odometry)
         start = time.perf_counter()
         words = [HOLOZEN, "up", *meet_at(endpoint)]
-        with subprocess.Popen(words, cwd=ROOT, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
+        with subprocess.Popen(
+            words, cwd=ROOT, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE
+        ) as process:
             came = odom.wait(0, timeout=20)
             took = time.perf_counter() - start
             process.terminate()
@@ -67,14 +79,20 @@ def meet_at(endpoint: str) -> Sequence[str]:
 
 
 def echo(rate: float, turns: int) -> Case:
-    """The first echoed line against the raw subscriber's, while a robot publishes odom at `rate`."""
+    """The first echoed line against the raw subscriber's, while a robot publishes odom at
+    `rate`.
+    """
     endpoint = meeting_point()
     with beside(odom_publisher, endpoint, rate):
         wait_for_odom(endpoint)
         return Case(f"first line, odom at {rate:g} Hz", "ms", ECHO_AIM).take_turns(
             turns,
-            holozen=lambda: first_line(HOLOZEN, "topic", "echo", "odom", "--once", *meet_at(endpoint)),
-            raw_zenoh=lambda: first_line(sys.executable, str(ROOT / "benchmarks" / "raw_zenoh.py"), "echo", endpoint),
+            holozen=lambda: first_line(
+                HOLOZEN, "topic", "echo", "odom", "--once", *meet_at(endpoint)
+            ),
+            raw_zenoh=lambda: first_line(
+                sys.executable, str(ROOT / "benchmarks" / "raw_zenoh.py"), "echo", endpoint
+            ),
             python_alone=lambda: first_line(sys.executable, "-c", "print('up')"),
         )
 
@@ -83,7 +101,11 @@ def main() -> int:
     args = parser("startup", __doc__).parse_args()
     compile_tree()
     cases = [echo(rate, turns=1 if args.quick else 40) for rate in RATES]
-    cases.append(Case("up to first odom", "ms", UP_AIM).take_turns(1 if args.quick else 15, holozen=first_odom))
+    cases.append(
+        Case("up to first odom", "ms", UP_AIM).take_turns(
+            1 if args.quick else 15, holozen=first_odom
+        )
+    )
     publish("startup", cases, args.json)
     return 0
 

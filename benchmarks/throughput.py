@@ -1,5 +1,5 @@
-"""Odometry from one process to another as fast as possible: our bus, typed at both ends, against raw zenoh-python with
-the same bytes, and msgspec at both ends.
+"""Odometry from one process to another as fast as possible: our bus, typed at both ends, against
+raw zenoh-python with the same bytes, and msgspec at both ends.
 """
 
 import sys
@@ -65,7 +65,9 @@ def raw(endpoint: str) -> Iterator[Recv]:
 
 
 def timed(side: Callable[[str], Any], seconds: float) -> list[float]:
-    """Microseconds for each message, over some seconds. Each side takes both cores, so they never run together."""
+    """Microseconds for each message, over some seconds. Each side takes both cores, so they never
+    run together.
+    """
     with side(meeting_point()) as recv:
         count, start = 0, time.perf_counter()
         while (passed := time.perf_counter() - start) < seconds:

@@ -1,18 +1,21 @@
 """What a view costs the sim: a hundred robots that drive, in a page of `holozen view`.
 
-The sim runs in real time, and another process commands each robot four times a second. In turns, a view with an open
-page is there or not. Times are processor time: of the sim's process for a second of its own time, and of the view's
-for a second of real time. The page takes all that it is sent, and draws nothing; it counts the frames that move one
-robot. At the end Chromium, if it is there, opens the page of all robots and that of one: the time from the start of
-`holozen view` to a picture with a robot. The browser has been started before, and draws without a graphics card.
+The sim runs in real time, and another process commands each robot four times a second. In turns, a
+view with an open page is there or not. Times are processor time: of the sim's process for a second
+of its own time, and of the view's for a second of real time. The page takes all that it is sent,
+and draws nothing; it counts the frames that move one robot. At the end Chromium, if it is there,
+opens the page of all robots and that of one: the time from the start of `holozen view` to a picture
+with a robot. The browser has been started before, and draws without a graphics card.
 """
 
+import json
 import multiprocessing
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,13 +26,23 @@ from typing import Any
 import viser
 import websockets.sync.client as websockets
 import zstandard
+from websockets.typing import Origin, Subprotocol
 
-from benchmarks.company import beside, guest, meeting_point, processor_time, until
+from benchmarks.company import (
+    beside,
+    chromium,
+    guest,
+    meeting_point,
+    page_address,
+    processor_time,
+    until,
+)
 from benchmarks.fleet import drive
 from benchmarks.report import Case, parser, publish
 from holozen import data
 from holozen.bus import Bus
 from holozen.messages import Odometry, SimulationStatus
+from holozen.view.protocol import PROTOCOL
 
 AIM = (
     "the sim needs at most 1 / 0.95 of its time, and keeps 0.95 of its real-time factor; "
@@ -59,7 +72,7 @@ SEES_ROBOT = """() => new Promise((done, fail) => {
         setTimeout(() => requestAnimationFrame(look));  // after the drawing, of which nothing is left later
     };
     look();
-})"""  # waits for the orange deck of a robot in the picture
+})"""  # waits for the orange deck of a robot in the picture  # noqa: E501
 WATCHED = b"/entities/bot0"  # its node in the page
 MOVED = b"\xa4name" + bytes([0xA0 | len(WATCHED)]) + WATCHED + b"\xa8position"  # in msgpack
 HEADER = 16  # bytes of viser's message before what is compressed
@@ -69,7 +82,17 @@ HEADER = 16  # bytes of viser's message before what is compressed
 def started(endpoint: str, verb: str, *words: str) -> Iterator[tuple[int, Path]]:
     """Runs a verb in this block: its process id, and the file of what it prints."""
     with tempfile.NamedTemporaryFile() as file:
-        command = [sys.executable, "-m", "holozen", verb, *words, "--connect", endpoint, "--listen", endpoint]
+        command = [
+            sys.executable,
+            "-m",
+            "holozen",
+            verb,
+            *words,
+            "--connect",
+            endpoint,
+            "--listen",
+            endpoint,
+        ]
         process = subprocess.Popen(command, stdout=file, stderr=file)
         try:
             yield process.pid, Path(file.name)
@@ -79,11 +102,19 @@ def started(endpoint: str, verb: str, *words: str) -> Iterator[tuple[int, Path]]
 
 
 def page(address: str, frames: Any) -> None:
-    """A page that takes what it is sent, and counts in `frames` how often the watched robot has moved."""
-    name = f"viser-v{viser.__version__}"
-    with websockets.connect(address.replace("http", "ws"), subprotocols=[name], max_size=None) as socket:  # type: ignore[list-item]
-        for message in socket:
-            frames.value += moves(bytes(message))  # type: ignore[arg-type]
+    """A page that takes what it is sent, and counts in `frames` how often the watched robot has
+    moved.
+    """
+    origin, own = address.rstrip("/"), address.rstrip("/").replace("http", "ws")
+    viser_own, of_page = Subprotocol(f"viser-v{viser.__version__}"), Subprotocol(PROTOCOL)
+    with websockets.connect(f"{own}/drive", origin=Origin(origin), subprotocols=[of_page]) as drive:
+        ticket = json.loads(drive.recv())["ticket"]
+        threading.Thread(target=lambda: [None for _ in drive], daemon=True).start()  # it reads on
+        with websockets.connect(
+            f"{own}/scene/{ticket}/", subprotocols=[viser_own], max_size=None
+        ) as scene:
+            for message in scene:
+                frames.value += moves(bytes(message))  # type: ignore[arg-type]
 
 
 def moves(message: bytes) -> int:
@@ -97,23 +128,29 @@ def started_view(endpoint: str) -> Iterator[tuple[int, str]]:
     """A view in this block: its process id and its address, once it has printed that."""
     with started(endpoint, "view", "--port", "0") as (process, printed):
         until(lambda: "http://" in printed.read_text(), 0.01)
-        yield process, next(word for word in printed.read_text().split() if word.startswith("http://"))
+        yield process, page_address(printed.read_text())
 
 
 def first_pictures(endpoint: str, times: int) -> list[float]:
-    """Seconds from the start of the command to a robot in the picture of Chromium, so many times."""
+    """Seconds from the start of the command to a robot in the picture of Chromium, so many
+    times.
+    """
     from playwright.sync_api import sync_playwright
 
-    flags = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
     found = []
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=flags)
+        browser = chromium(playwright)
         for _ in range(times):
             page = browser.new_page(viewport={"width": 960, "height": 320})
             began = time.monotonic()
             with started_view(endpoint) as (_, address):
                 page.goto(address, wait_until="commit")
-                page.evaluate(SEES_ROBOT)
+                page.wait_for_selector("#frame[src]", state="attached")
+                element = page.query_selector("#frame")
+                scene = element and element.content_frame()
+                assert scene
+                scene.wait_for_url("**/scene/**", wait_until="commit")
+                scene.evaluate(SEES_ROBOT)
                 found.append(time.monotonic() - began)
             page.close()
         browser.close()
@@ -134,7 +171,9 @@ class Sim:
         return status.time
 
     def cost(self, seconds: float, other: int = 0) -> tuple[float, float, float]:
-        """Over so many seconds: processor time a second of its own, real-time factor, and the load by `other`."""
+        """Over so many seconds: processor time a second of its own, real-time factor, and the load
+        by `other`.
+        """
         other = other or self._process
         began, own, work, others = (
             time.monotonic(),
@@ -198,7 +237,10 @@ def main() -> int:
     ratio = median(factors["with"]) / median(factors["without"])
     each = {side: [round(factor, 3) for factor in found] for side, found in factors.items()}
     print(f"real-time factor, with a view over without: {ratio:.3f}, of {each}")
-    print(f"the view's load of a core: {median(loads):.2f}, of {', '.join(f'{load:.2f}' for load in loads)}")
+    print(
+        f"the view's load of a core: {median(loads):.2f}, of "
+        f"{', '.join(f'{load:.2f}' for load in loads)}"
+    )
     print(f"frames dropped, of {RATE:g} a second: {', '.join(f'{part:.1%}' for part in dropped)}")
     for what, found in first.items():
         print(f"first picture of {what}: {', '.join(f'{one:.1f} s' for one in found)}")

@@ -10,7 +10,9 @@ T = TypeVar("T")
 
 
 def background(work: Callable[[], T]) -> Callable[[], T]:
-    """Start `work` now. The returned function waits for its end, and returns its result or raises its error."""
+    """Start `work` now. The returned function waits for its end, and returns its result or raises
+    its error.
+    """
     results: list[T] = []
     errors: list[BaseException] = []
     done = threading.Event()  # Thread.join considers a thread ended once Ctrl-C has interrupted it
@@ -34,6 +36,8 @@ def background(work: Callable[[], T]) -> Callable[[], T]:
 
 
 def at_once(work: Callable[[], T]) -> Callable[[], T]:
-    """As `background`, but in the calling thread: `work` is done, or has raised its error, when this returns."""
+    """As `background`, but in the calling thread: `work` is done, or has raised its error, when
+    this returns.
+    """
     result = work()
     return lambda: result

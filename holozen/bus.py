@@ -6,5 +6,13 @@ from holozen.transport.errors import BusError, NoReply, ServiceError
 from holozen.transport.pubsub import Latest, Publisher, Received, Subscription
 
 __all__ = [
-    "Bus", "BusError", "Connection", "Latest", "NoReply", "Publisher", "Received", "ServiceError", "Subscription",
-]  # fmt: skip
+    "Bus",
+    "BusError",
+    "Connection",
+    "Latest",
+    "NoReply",
+    "Publisher",
+    "Received",
+    "ServiceError",
+    "Subscription",
+]

@@ -1,7 +1,7 @@
 """Output for people: lines, and pictures redrawn in a terminal.
 
-Writing a line never blocks: if a pipe is not read, or Ctrl-S holds the terminal, lines are dropped. Their number is
-reported once reading resumes.
+Writing a line never blocks: if a pipe is not read, or Ctrl-S holds the terminal, lines are dropped.
+Their number is reported once reading resumes.
 """
 
 import _thread
@@ -16,17 +16,21 @@ from collections import deque
 from typing import Self
 
 KEPT = 256  # lines queued for a slow reader
-SHORT_WAIT = 0.005  # s; usually enough to write the line, which keeps the order of a process's output
+# s; usually enough to write the line, which keeps the order of a process's output
+SHORT_WAIT = 0.005
 LOG_WAIT = 0.1  # s, once, for a slow reader of a script's log
 LAST_WAIT = 0.2  # s without progress, after which output that is not read is abandoned at exit
 BUSY = 5.0  # s at most at exit, on a busy machine
 EVERY = {True: 0.1, False: 1.0}  # s between two pictures, in a terminal and elsewhere
 SIZE = (80, 24)
-_BEGIN, _END = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"  # enter the alternate screen and hide the cursor; undo it
+# enter the alternate screen and hide the cursor; undo it
+_BEGIN, _END = ("\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l")
 
 
 class Failure(Exception):
-    """A request that cannot be met. One line, for a person: what was given, where, what is allowed, what to do."""
+    """A request that cannot be met. One line, for a person: what was given, where, what is allowed,
+    what to do.
+    """
 
 
 def printable(text: str) -> str:
@@ -35,13 +39,48 @@ def printable(text: str) -> str:
 
 
 def report(text: str) -> None:
-    """Write one line on standard error."""
-    _ERRORS.write(printable(text))
+    """Write one line on standard error; after `write_json`, an object on standard output."""
+    if _Form.is_json:
+        output(text)
+    else:
+        _ERRORS.write(printable(text))
 
 
 def output(text: str) -> None:
     """Write one line on standard output, without blocking if it is not read."""
+    if _Form.is_json:
+        import json
+
+        text = json.dumps({"text": text})
     _OUTPUT.write(printable(text))
+
+
+class _Form:
+    """Whether lines are JSON."""
+
+    is_json = False
+
+
+def write_json() -> None:
+    """Let `report` and `output` write JSON from now on, one object a line."""
+    _Form.is_json = True
+
+
+def tell(text: str) -> None:
+    """Print one line about what a verb has done. The verb goes on if the reader, such as head, has
+    gone.
+    """
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        discard(sys.stdout.fileno())
+
+
+def discard(number: int) -> None:
+    """Send what is written to a file descriptor from now on to /dev/null."""
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, number)
+    os.close(null)
 
 
 def log(text: str, stdout: bool = False) -> None:
@@ -56,15 +95,17 @@ def drain(seconds: float = LAST_WAIT) -> None:
 
 
 def give_up_readers() -> None:
-    """Send each output that is not being read to /dev/null. For signal handlers: a main thread that is blocked in
-    `write` goes on too, since the signal interrupts the call and Python retries it.
+    """Send each output that is not being read to /dev/null. For signal handlers: a main thread that
+    is blocked in `write` goes on too, since the signal interrupts the call and Python retries it.
     """
     for lines in (_OUTPUT, _ERRORS):
         lines.give_up()
 
 
 class _Lines:
-    """A queue of lines for a file descriptor. A thread writes them, since `os.write` waits for the reader."""
+    """A queue of lines for a file descriptor. A thread writes them, since `os.write` waits for the
+    reader.
+    """
 
     def __init__(self, number: int) -> None:
         self._number = number
@@ -77,10 +118,15 @@ class _Lines:
         self._is_idle = True
 
     def write(self, line: str, patience: float = SHORT_WAIT) -> None:
-        """Queue a line. If the queue is full, wait `patience` seconds for room, but only for the first line dropped."""
-        stream, usual = (sys.stdout, sys.__stdout__) if self._number == 1 else (sys.stderr, sys.__stderr__)
+        """Queue a line. If the queue is full, wait `patience` seconds for room, but only for the
+        first line dropped.
+        """
+        stream, usual = (
+            (sys.stdout, sys.__stdout__) if self._number == 1 else (sys.stderr, sys.__stderr__)
+        )
         if stream is not usual:  # replaced by a test or a script
-            with contextlib.suppress(OSError, ValueError):  # neither a vanished terminal nor a closed file is an error
+            # neither a vanished terminal nor a closed file is an error
+            with contextlib.suppress(OSError, ValueError):
                 print(line, file=stream, flush=True)
             return
         if stream is None:  # closed by the parent process; the descriptor may be another file's now
@@ -100,15 +146,15 @@ class _Lines:
             self._written.acquire(timeout=SHORT_WAIT)
 
     def give_up(self) -> None:
-        """Send output to /dev/null if it is not being read. Takes no lock: a signal may come while it is held."""
+        """Send output to /dev/null if it is not being read. Takes no lock: a signal may come while
+        it is held.
+        """
         poll = select.poll()
         poll.register(self._number, select.POLLOUT)
         if (sys.__stdout__ if self._number == 1 else sys.__stderr__) is None or poll.poll(0):
             return
         self._is_given_up = True
-        null = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(null, self._number)
-        os.close(null)
+        discard(self._number)
 
     def drain(self, seconds: float) -> None:
         """Wait until all is written, or the reader has read nothing for `seconds`."""
@@ -128,10 +174,11 @@ class _Lines:
             while data:
                 try:
                     data = data[os.write(self._number, data) :]
-                except BlockingIOError:  # another process has made the shared terminal or pipe non-blocking
+                # another process has made the shared terminal or pipe non-blocking
+                except BlockingIOError:
                     select.select([], [self._number], [], LOG_WAIT)
                 except OSError:  # the reader is gone
-                    os.dup2(os.open(os.devnull, os.O_WRONLY), self._number)
+                    discard(self._number)
 
     def _next(self) -> bytes:
         """The next data to write; empty when this thread may end."""
@@ -141,7 +188,7 @@ class _Lines:
                 return self._waiting.popleft()
             dropped, self._dropped = self._dropped, 0
             if dropped:
-                return f"... and {dropped} more lines were dropped, as the output was not read\n".encode()
+                return f"... and {dropped} more lines were dropped, as the output was not read\n".encode()  # noqa: E501
             self._is_idle = True
             if self._written.locked():
                 self._written.release()
@@ -167,7 +214,9 @@ class Line:
 
 
 class Screen:
-    """Redraws pictures in a terminal; elsewhere prints them in sequence. Use it in `with`: it restores the terminal."""
+    """Redraws pictures in a terminal; elsewhere prints them in sequence. Use it in `with`: it
+    restores the terminal.
+    """
 
     def __init__(self, once: bool, ascii: bool = False) -> None:
         self.terminal = sys.stdout.isatty() and not once

@@ -1,4 +1,5 @@
-"""The client side of the sims' services: list, locate, spawn and delete robots and objects; pause, step and reset.
+"""The client side of the sims' services: list, locate, spawn and delete robots and objects; pause,
+step and reset.
 
 Several sims may run on one wire, of which one spawns. Requests about entities go to all of them.
 """
@@ -53,18 +54,24 @@ R = TypeVar(
 
 
 def names(bus: Bus, notice: float = 0.0) -> list[str]:
-    """The names of all entities, sorted. Raises ServiceError, also if no sim answers within `notice` s (0: 3 s)."""
+    """The names of all entities, sorted. Raises ServiceError, also if no sim answers within
+    `notice` s (0: 3 s).
+    """
     return sorted({name for names in names_by_sim(bus, notice) for name in names})
 
 
 def names_by_sim(bus: Bus, notice: float) -> list[list[str]]:
-    """For each sim the names of its entities. Raises ServiceError, also if none answers within `notice` s (0: 3 s)."""
+    """For each sim the names of its entities. Raises ServiceError, also if none answers within
+    `notice` s (0: 3 s).
+    """
     replies = ask_sims(bus, "get_entities", si.GetEntitiesRequest(), si.GetEntitiesReply, notice)
     return [reply.entities for reply in replies]
 
 
 def ask_sims(bus: Bus, key: str, request: Message, reply: type[R], notice: float = 0.0) -> list[R]:
-    """The good replies of all sims. Raises ServiceError, also if no sim answers within `notice` s (0: 3 s)."""
+    """The good replies of all sims. Raises ServiceError, also if no sim answers within `notice` s
+    (0: 3 s).
+    """
     notice = notice or NOTICE
     bus.endpoints()  # once they are known, all sims are connected
     try:
@@ -72,13 +79,16 @@ def ask_sims(bus: Bus, key: str, request: Message, reply: type[R], notice: float
     except NoReply:
         where = f" at {bus.where}" if bus.connected() else f": no nodes found at {bus.where}"
         raise ServiceError(
-            f"no sim answered within {notice:g} s{where}; start one in another terminal: holozen sim"
+            f"no sim answered within {notice:g} s{where}; start one in another terminal: holozen "
+            "sim"
         ) from None
 
 
 def pose(bus: Bus, name: str) -> Pose:
     """The pose of an entity in the world. Raises ServiceError."""
-    return _ask(bus, "get_entity_state", si.GetEntityStateRequest(name), si.GetEntityStateReply, PATIENCE)[0].state.pose
+    return _ask(
+        bus, "get_entity_state", si.GetEntityStateRequest(name), si.GetEntityStateReply, PATIENCE
+    )[0].state.pose
 
 
 def delete(bus: Bus, name: str) -> None:
@@ -87,8 +97,12 @@ def delete(bus: Bus, name: str) -> None:
 
 
 def description(bus: Bus, name: str, number: int, timeout: float) -> RobotDescriptionReply | None:
-    """What the entity of this name and number looks like; None if it is not there now. Raises ServiceError."""
-    replies = bus.call_all("robot_description", RobotDescriptionRequest(name), RobotDescriptionReply, timeout)
+    """What the entity of this name and number looks like; None if it is not there now. Raises
+    ServiceError.
+    """
+    replies = bus.call_all(
+        "robot_description", RobotDescriptionRequest(name), RobotDescriptionReply, timeout
+    )
     return next((reply for reply in replies if reply.number == number), None)
 
 
@@ -110,14 +124,16 @@ def is_paused(bus: Bus, endpoints: Iterable[Endpoint]) -> bool:
 
 
 def step(bus: Bus, steps: int) -> list[str]:
-    """Let all sims, which must be paused, make `steps` steps. Returns their warnings. Raises ServiceError."""
+    """Let all sims, which must be paused, make `steps` steps. Returns their warnings. Raises
+    ServiceError.
+    """
     return _control(bus, "step_simulation", si.StepSimulationRequest(steps), si.StepSimulationReply)
 
 
 def step_until(bus: Bus, steps: int, timeout: float, stop: threading.Event) -> str:
-    """Let all sims, which must be paused, make `steps` steps, until `stop` is set or `timeout` s have passed; then the
-    steps end. Returns why and how early they ended, or "" if all were made. Raises ServiceError, also if it is not
-    certain that they have ended.
+    """Let all sims, which must be paused, make `steps` steps, until `stop` is set or `timeout` s
+    have passed; then the steps end. Returns why and how early they ended, or "" if all were made.
+    Raises ServiceError, also if it is not certain that they have ended.
     """
     if stop.is_set():
         return NONE_MADE
@@ -131,7 +147,9 @@ def step_until(bus: Bus, steps: int, timeout: float, stop: threading.Event) -> s
 
 
 class Stepping:
-    """The steps of all sims as goals of `simulate_steps`, which have one id and can be cancelled."""
+    """The steps of all sims as goals of `simulate_steps`, which have one id and can be
+    cancelled.
+    """
 
     def __init__(self, bus: Bus, steps: int, timeout: float) -> None:
         self._bus, self._steps, self._timeout = bus, steps, timeout
@@ -147,7 +165,12 @@ class Stepping:
             self.ended.set()
 
     def _run(self) -> str:
-        ask_sims(self._bus, "get_simulation_state", si.GetSimulationStateRequest(), si.GetSimulationStateReply)
+        ask_sims(
+            self._bus,
+            "get_simulation_state",
+            si.GetSimulationStateRequest(),
+            si.GetSimulationStateReply,
+        )
         messages = si.SimulateSteps.Impl
         send, result = messages.SendGoalService, messages.GetResultService
         if self._is_cancelled:
@@ -158,7 +181,9 @@ class Stepping:
         if not all(reply.accepted for reply in accepted):
             self.cancel()
             raise ServiceError("a sim rejected the steps: it has too many goals")
-        replies = self._call(RESULT, result.Request(goal_id=self._goal), result.Response, PATIENCE + self._timeout)
+        replies = self._call(
+            RESULT, result.Request(goal_id=self._goal), result.Response, PATIENCE + self._timeout
+        )
         early = ""
         for reply in replies:
             why = reply.result.result.error_message
@@ -188,24 +213,28 @@ class Stepping:
 
 def reset(bus: Bus, scope: int = si.ResetSimulationRequest.SCOPE_DEFAULT) -> list[str]:
     """Reset all sims to their start. Returns their warnings. Raises ServiceError."""
-    return _control(bus, "reset_simulation", si.ResetSimulationRequest(scope), si.ResetSimulationReply)
+    return _control(
+        bus, "reset_simulation", si.ResetSimulationRequest(scope), si.ResetSimulationReply
+    )
 
 
 def spawn(bus: Bus, name: str, text: str, at: Pose, namespace: str = "") -> tuple[str, list[str]]:
-    """Spawn a robot or object from URDF or SDF text. Returns its name in the world, and the sim's warnings about the
-    text. Raises ServiceError.
+    """Spawn a robot or object from URDF or SDF text. Returns its name in the world, and the sim's
+    warnings about the text. Raises ServiceError.
 
     Its keys are below `namespace`: by default its name; a slash means the root.
     """
     place = PoseStamped(pose=at)
-    request = si.SpawnEntityRequest(name, resource_string=text, entity_namespace=namespace, initial_pose=place)
+    request = si.SpawnEntityRequest(
+        name, resource_string=text, entity_namespace=namespace, initial_pose=place
+    )
     (reply,) = _ask(bus, "spawn_entity", request, si.SpawnEntityReply, PATIENCE, everyone=False)
     return reply.entity_name or name, reply.result.error_message.splitlines()
 
 
 def for_each(ask: Callable[[T], U], items: Iterable[T]) -> Iterator[U]:
-    """The results of `ask` for each item, in order. Many run at a time, since a sim reads requests only every 20 ms.
-    Raises the first error, without waiting for the requests in flight.
+    """The results of `ask` for each item, in order. Many run at a time, since a sim reads requests
+    only every 20 ms. Raises the first error, without waiting for the requests in flight.
     """
     from concurrent.futures import ThreadPoolExecutor
 
@@ -227,7 +256,9 @@ def has_no_room(error: ServiceError) -> bool:
 
 
 def silent_sims(bus: Bus) -> list[str]:
-    """The sims that others know of, but that do not answer, with their robots: `sim@1a2b3c (Fred)`."""
+    """The sims that others know of, but that do not answer, with their robots: `sim@1a2b3c
+    (Fred)`.
+    """
     hidden = bus.hidden()
     robots = {end.session: [one for one in hidden if one.session == end.session] for end in hidden}
     return [
@@ -248,7 +279,9 @@ def robot_of(end: Endpoint) -> str:
 
 
 def _check_that_all_did(bus: Bus, did: int, sims: int) -> None:
-    """Raise ServiceError if only `did` of so many sims did as they were asked, or one that hangs was not asked."""
+    """Raise ServiceError if only `did` of so many sims did as they were asked, or one that hangs
+    was not asked.
+    """
     if silent := silent_sims(bus):
         raise ServiceError(f"{', '.join(silent)} did not answer, {DONE}; {HANGS}")
     if did < sims:
@@ -256,8 +289,12 @@ def _check_that_all_did(bus: Bus, did: int, sims: int) -> None:
 
 
 def _control(bus: Bus, key: str, request: Message, reply: type[Any]) -> list[str]:
-    """Ask all sims, and return their warnings. Raises ServiceError, also if one of them did not do it."""
-    ask_sims(bus, "get_simulation_state", si.GetSimulationStateRequest(), si.GetSimulationStateReply)
+    """Ask all sims, and return their warnings. Raises ServiceError, also if one of them did not do
+    it.
+    """
+    ask_sims(
+        bus, "get_simulation_state", si.GetSimulationStateRequest(), si.GetSimulationStateReply
+    )
     sims = len(bus.endpoints(SIMS))
     answers = bus.call_all(key, request, reply, PATIENCE)
     _check_that_all_did(bus, len(answers), sims)
@@ -269,8 +306,14 @@ def _code(error: ServiceError) -> object:
     return result.get("result") if isinstance(result, dict) else None
 
 
-def _ask(bus: Bus, key: str, request: Message, reply: type[R], timeout: float, everyone: bool = True) -> list[R]:
-    answers = bus.call_all(key, request, reply, timeout) if everyone else [bus.call(key, request, reply, timeout)]
+def _ask(
+    bus: Bus, key: str, request: Message, reply: type[R], timeout: float, everyone: bool = True
+) -> list[R]:
+    answers = (
+        bus.call_all(key, request, reply, timeout)
+        if everyone
+        else [bus.call(key, request, reply, timeout)]
+    )
     good = [answer for answer in answers if answer.result.result == si.Result.OK]
     if not good:  # our sim sends an error reply instead; others may not
         result = answers[0].result

@@ -8,25 +8,35 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterable
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from holozen.console import report
-from holozen.suggest import suggest, suggest_file
+from holozen.suggest import cut, suggest, suggest_file
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 DRIVES = ("planar_move", "omni")
-DRIVE = "planar_move for a robot whose file has no drive; omni: on its own wheels, instead of planar_move"
+DRIVE = (
+    "planar_move for a robot whose file has no drive; omni: on its own wheels, instead of "
+    "planar_move"
+)
 ENGINES = ("pybullet", "mujoco")
-ENGINE = f"the physics engine (default: {ENGINES[0]})"
+AUTO = "auto"  # pybullet where it is installed, else mujoco
+ENGINE = (
+    f"the physics engine; {AUTO}: {ENGINES[0]} where it is installed, else {ENGINES[1]} "
+    f"(default: {AUTO})"
+)
 NAMED = "--robot FILE=NAME gives a robot's name"
 NEGATIVE = re.compile(r"-\.?\d")  # begins a negative number; argparse itself takes -1e-3 for a flag
 WIDTH = 100  # characters of a line of help where there is no terminal
 
 
 class Formatter(argparse.HelpFormatter):
-    """Help in paragraphs, as wide as the terminal. argparse itself would load shutil for that, which takes 3 ms."""
+    """Help in paragraphs, as wide as the terminal. argparse itself would load shutil for that,
+    which takes 3 ms.
+    """
 
     def __init__(self, prog: str) -> None:
         try:
@@ -36,11 +46,34 @@ class Formatter(argparse.HelpFormatter):
         super().__init__(prog, width=max(40, min(width, 120)), max_help_position=30)
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
-        return "\n\n".join(super(Formatter, self)._fill_text(part, width, indent) for part in text.split("\n\n"))
+        return "\n\n".join(
+            super(Formatter, self)._fill_text(part, width, indent) for part in text.split("\n\n")
+        )
+
+
+class WriteJson(argparse.Action):
+    """`--json` of a service."""
+
+    def __call__(self, *_args: Any) -> None:
+        """From now on, what it reports is JSON."""
+        from holozen.console import write_json
+
+        write_json()
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """Add the flag `--json` of a service."""
+    text = "print what it reports as JSON, one object per line"
+    parser.add_argument("--json", action=WriteJson, nargs=0, help=text)
+
+
+CONNECTION = "zenoh"  # the title of the group of flags that say how to connect
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that reports a mistake in one line and suggests the closest valid word. Flags are written in full."""
+    """A parser that reports a mistake in one line and suggests the closest valid word. Flags are
+    written in full.
+    """
 
     def __init__(self, **options: Any) -> None:
         self._words: list[str] = []  # the arguments
@@ -51,8 +84,46 @@ class Parser(argparse.ArgumentParser):
         self._words = list(sys.argv[1:] if args is None else args)
         return super().parse_known_args(args, namespace)
 
+    def format_help(self) -> str:
+        """As argparse, except that one line says where the flags of the connection are."""
+        connection = self._connection()
+        formatter = self._get_formatter()
+        self._add_usage(formatter)
+        formatter.add_text(self.description)
+        for group in self._action_groups:
+            if group not in connection:
+                formatter.start_section(group.title)
+                formatter.add_text(group.description)
+                formatter.add_arguments(group._group_actions)
+                formatter.end_section()
+        if connection:
+            formatter.add_text("connection flags: `holozen help network`")
+        formatter.add_text(self.epilog)
+        return formatter.format_help()
+
+    def format_whole_help(self) -> str:
+        """As argparse, with the flags of the connection."""
+        return super().format_help()
+
+    def format_usage(self) -> str:
+        """As argparse, without the flags of the connection."""
+        formatter = self._get_formatter()
+        self._add_usage(formatter)
+        return formatter.format_help()
+
+    def _connection(self) -> list[Any]:
+        """The groups with the flags of the connection."""
+        return [group for group in self._action_groups if group.title == CONNECTION]
+
+    def _add_usage(self, formatter: argparse.HelpFormatter) -> None:
+        apart = {id(action) for group in self._connection() for action in group._group_actions}
+        shown = [action for action in self._actions if id(action) not in apart]
+        formatter.add_usage(self.usage, shown, self._mutually_exclusive_groups)
+
     def _parse_optional(self, arg_string: str) -> Any:
-        """As argparse, except that a negative number is a value unless that very number is a flag."""
+        """As argparse, except that a negative number is a value unless that very number is a
+        flag.
+        """
         if NEGATIVE.match(arg_string) and arg_string not in self._option_string_actions:
             return None
         return super()._parse_optional(arg_string)
@@ -63,7 +134,11 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Report the mistake, and exit with code 2."""
-        verbs = [action.choices for action in self._actions if isinstance(action, argparse._SubParsersAction)]
+        verbs = [
+            action.choices
+            for action in self._actions
+            if isinstance(action, argparse._SubParsersAction)
+        ]
         for choices in verbs:
             if self._words and self._words[0] in choices:
                 choices[self._words[0]].error(message)  # the flags belong to this verb
@@ -79,13 +154,19 @@ class Parser(argparse.ArgumentParser):
         raise SystemExit(2)
 
     def _unknown_flag(self, message: str, left: list[str]) -> str:
-        """The unknown flag: the first word in `left`, else the word before the value that `message` complains about, or
-        in place of a required argument.
+        """The unknown flag: the first word in `left`, else the word before the value that `message`
+        complains about, or in place of a required argument.
         """
         lacks_argument = "are required: " in message
-        for word, value in [(word, word) for word in left] or zip(self._words, [*self._words[1:], ""], strict=False):
+        for word, value in [(word, word) for word in left] or zip(
+            self._words, [*self._words[1:], ""], strict=False
+        ):
             flag = word.partition("=")[0]
-            unknown = flag[:1] == "-" and flag not in self._option_string_actions and not NEGATIVE.match(flag)
+            unknown = (
+                flag[:1] == "-"
+                and flag not in self._option_string_actions
+                and not NEGATIVE.match(flag)
+            )
             if unknown and (left or lacks_argument or repr(value) in message):
                 return flag
         return ""
@@ -94,17 +175,29 @@ class Parser(argparse.ArgumentParser):
         if action.choices is not None and value not in action.choices:
             words = [str(choice) for choice in action.choices]
             be = "is" if len(words) == 1 else "are"
-            raise argparse.ArgumentError(action, f"{value!r}{suggest(value, words)}; there {be} {', '.join(words)}")
+            raise argparse.ArgumentError(
+                action, f"{value!r}{suggest(value, words)}; there {be} {', '.join(words)}"
+            )
 
 
 class Instead(argparse.Action):
-    """A flag of ros2 without a meaning here, which is refused in one line with `advice` on what to use."""
+    """A flag of ros2 without a meaning here, which is refused in one line with `advice` on what to
+    use.
+    """
 
     def __init__(self, option_strings: list[str], dest: str, advice: str) -> None:
-        super().__init__(option_strings, dest, nargs="?", default=argparse.SUPPRESS, help=argparse.SUPPRESS)
+        super().__init__(
+            option_strings, dest, nargs="?", default=argparse.SUPPRESS, help=argparse.SUPPRESS
+        )
         self._advice = advice
 
-    def __call__(self, parser: argparse.ArgumentParser, _args: object, _value: object, flag: str | None = None) -> None:
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        _args: object,
+        _value: object,
+        flag: str | None = None,
+    ) -> None:
         """Refuse it."""
         parser.error(f"no flag {flag!r}; {self._advice}")
 
@@ -112,6 +205,11 @@ class Instead(argparse.Action):
 def refused(text: str) -> Exception:
     """The error that a parser of values raises."""
     return argparse.ArgumentTypeError(text)
+
+
+def packages_in(words: Iterable[str]) -> dict[str, Path]:
+    """The packages that words of a command line give: name -> folder."""
+    return dict(package(value) for flag, value in pairwise(words) if flag == "--package")
 
 
 def number(low: float, high: float, unit: str = "") -> Callable[[str], float]:
@@ -134,7 +232,10 @@ def count(low: int = 0, high: float = math.inf) -> Callable[[str], int]:
 
     def parse(text: str) -> int:
         if not text.isdecimal() or not low <= int(text) <= high:
-            raise refused(f"{text!r}: use a whole number from {low} {'up' if high == math.inf else f'to {high}'}")
+            raise refused(
+                f"{text!r}: use a whole number from {low} "
+                f"{'up' if high == math.inf else f'to {high}'}"
+            )
         return int(text)
 
     return parse
@@ -146,6 +247,10 @@ port = count(0, 65535)
 
 def key(text: str) -> str:
     """Parses a key; removes ROS's leading slash, which Zenoh keys do not have."""
+    from holozen.transport.errors import LONGEST_KEY
+
+    if len(text) > LONGEST_KEY:
+        raise refused(f"{cut(text)}: {len(text)} characters; a key has at most {LONGEST_KEY}")
     return text.removeprefix("/")
 
 
@@ -174,15 +279,27 @@ def add_packages(
     parser: argparse.ArgumentParser, use: str = "whose msg, srv and action files define its types"
 ) -> None:
     """Add the flag `--package`; `use`: what its folder is for."""
-    parser.add_argument("--package", type=package, action="append", default=[], metavar="NAME=DIR",
-        help=f"the folder of package NAME, {use}")  # fmt: skip
+    parser.add_argument(
+        "--package",
+        type=package,
+        action="append",
+        default=[],
+        metavar="NAME=DIR",
+        help=f"the folder of package NAME, {use}",
+    )
 
 
 def add_robot_sources(parser: argparse.ArgumentParser) -> None:
     """Add the flags `--package` and `--allow-env`, for a verb that reads robot files."""
     add_packages(parser, "for $(find NAME) and package://NAME")
-    parser.add_argument("--allow-env", type=variable, action="append", default=[], metavar="NAME",
-        help="let a file read this environment variable, as $(env NAME)")  # fmt: skip
+    parser.add_argument(
+        "--allow-env",
+        type=variable,
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="let a file read this environment variable, as $(env NAME)",
+    )
 
 
 def pair(text: str) -> tuple[str, str]:
@@ -196,7 +313,9 @@ def pair(text: str) -> tuple[str, str]:
 def assigned(words: Iterable[str]) -> str:
     """The first of the words that is name=value, as it is meant: name:=value. Empty without one."""
     parts = [word.partition("=") for word in words]
-    return next((f"{name}:={value}" for name, equals, value in parts if equals and name.isidentifier()), "")
+    return next(
+        (f"{name}:={value}" for name, equals, value in parts if equals and name.isidentifier()), ""
+    )
 
 
 def path(text: str) -> Path:

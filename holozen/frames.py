@@ -23,13 +23,19 @@ class Frames:
     """The latest transform from each frame to its parent. Metres, radians, seconds."""
 
     def __init__(self) -> None:
-        self._parents: dict[str, tuple[str, Transform, float]] = {}  # by child; with the stamp, 0 for a static one
+        # by child; with the stamp, 0 for a static one
+        self._parents: dict[str, tuple[str, Transform, float]] = {}
 
     def take(self, message: TFMessage, static: bool) -> None:
         """Store the transforms of a message on `tf` or, if `static`, on `tf_static`."""
         for each in message.transforms:
             rigid = Transform.of(each.transform.translation, each.transform.rotation)
-            self.put(each.header.frame_id, each.child_frame_id, rigid, 0.0 if static else each.header.stamp.seconds())
+            self.put(
+                each.header.frame_id,
+                each.child_frame_id,
+                rigid,
+                0.0 if static else each.header.stamp.seconds(),
+            )
 
     def put(self, parent: str, child: str, at: Transform, stamp: float) -> None:
         """Store the pose of the frame `child` in `parent`, and its stamp in s."""
@@ -44,17 +50,23 @@ class Frames:
         return sorted({*self._parents, *(parent for parent, _, _ in self._parents.values())})
 
     def lookup(self, source: str, target: str) -> tuple[Transform, float]:
-        """The pose of `target` in the frame `source`, and the stamp of the newest transform between them.
+        """The pose of `target` in the frame `source`, and the stamp of the newest transform between
+        them.
 
         Raises LookupError with the reason.
         """
         for name in (source, target):
             if name not in (names := self.names()):
-                raise LookupError(f"no frame {name!r}{suggest(name, names)}; frames: {listed(names)}")
+                raise LookupError(
+                    f"no frame {name!r}{suggest(name, names)}; frames: {listed(names)}"
+                )
         root, to_source, first = self._to_root(source)
         other, to_target, second = self._to_root(target)
         if root != other:
-            raise LookupError(f"nothing connects {source!r} and {target!r}: their roots are {root!r} and {other!r}")
+            raise LookupError(
+                f"nothing connects {source!r} and {target!r}: their roots are {root!r} and "
+                f"{other!r}"
+            )
         return to_source.inverse() @ to_target, max(first, second)
 
     def _to_root(self, frame: str) -> tuple[str, Transform, float]:
@@ -70,8 +82,9 @@ class Frames:
 
 
 class Elapsed:
-    """Elapsed time in s. Each update adds what passed by the clock or by a robot's stamps, whichever is less: nothing
-    while a sim is paused, and little where the stamps jump, as in a bag or after a reset.
+    """Elapsed time in s. Each update adds what passed by the clock or by a robot's stamps,
+    whichever is less: nothing while a sim is paused, and little where the stamps jump, as in a bag
+    or after a reset.
     """
 
     def __init__(self) -> None:
@@ -85,8 +98,9 @@ class Elapsed:
 
 
 class RobotFrames:
-    """The frames of a live robot, from `tf` and `tf_static` below `namespace`, and from the key `odometry`. A frame
-    without updates on `tf` is dropped after SILENCE, as long as odometry arrives.
+    """The frames of a live robot, from `tf` and `tf_static` below `namespace`, and from the key
+    `odometry`. A frame without updates on `tf` is dropped after SILENCE, as long as odometry
+    arrives.
     """
 
     def __init__(self, bus: Bus, namespace: str, odometry: str) -> None:
@@ -109,16 +123,23 @@ class RobotFrames:
                 if received.message:
                     self._tree.take(received.message, static)
                     until = math.inf if static else self._elapsed.total
-                    children = (each.child_frame_id.removeprefix("/") for each in received.message.transforms)
+                    children = (
+                        each.child_frame_id.removeprefix("/")
+                        for each in received.message.transforms
+                    )
                     self._heard.update(dict.fromkeys(children, until))
         if (newest := self._odometry.try_recv()) and (odom := newest.message):
             at = Transform.of(odom.pose.pose.position, odom.pose.pose.orientation)
-            self.root, self.body = (name.removeprefix("/") for name in (odom.header.frame_id, odom.child_frame_id))
+            self.root, self.body = (
+                name.removeprefix("/") for name in (odom.header.frame_id, odom.child_frame_id)
+            )
             stamp = odom.header.stamp.seconds()
             self._tree.put(self.root, self.body, at, stamp)
             self._elapsed.update(time.monotonic(), stamp)
             self._heard[self.body] = self._elapsed.total
-        for child in [child for child, heard in self._heard.items() if self._elapsed.total - heard > SILENCE]:
+        for child in [
+            child for child, heard in self._heard.items() if self._elapsed.total - heard > SILENCE
+        ]:
             self._tree.drop(child)
             del self._heard[child]
 
@@ -127,7 +148,9 @@ class RobotFrames:
         return self._tree.names()
 
     def of(self, frame: str, source: str = "") -> Transform | None:
-        """The pose of a frame in `source`, by default the robot's body frame; None if they are not connected."""
+        """The pose of a frame in `source`, by default the robot's body frame; None if they are not
+        connected.
+        """
         try:
             return self._tree.lookup(source or self.body, frame.removeprefix("/"))[0]
         except LookupError:

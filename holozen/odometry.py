@@ -1,5 +1,5 @@
-"""A robot's odometry: its messages, and as feedback for driving it, whether it is stale or lost, the robot rests, or is
-another one.
+"""A robot's odometry: its messages, and as feedback for driving it, whether it is stale or lost,
+the robot rests, or is another one.
 """
 
 import math
@@ -14,26 +14,38 @@ from holozen.rotation import XYZ, XYZW
 from holozen.wire import ODOM_SILENCE, SIM_SILENCE
 
 RESTS = 0.01  # m/s and rad/s; slower counts as at rest
-LOST = 0.4  # s without odom, once some arrived, so as not to drive blind; less than the sim's command timeout
+# s without odom, once some arrived, so as not to drive blind; less than the sim's command timeout
+LOST = 0.4
 UNKNOWN = [0.0] * 36  # covariances, row by row
 JUMP = 0.5  # m between two looks, more than its motion explains, that mean a reset
 
 
 def odometry(
-    header: Header, child: str, position: XYZ, rotation: XYZW, velocity: Planar, variances: list[float] = UNKNOWN
+    header: Header,
+    child: str,
+    position: XYZ,
+    rotation: XYZW,
+    velocity: Planar,
+    variances: list[float] = UNKNOWN,
 ) -> Odometry:
     """Odometry with a pose in the frame of `header` and a velocity in the body frame `child`."""
     pose = gm.PoseWithCovariance(gm.Pose.of(position, rotation), variances)
-    return Odometry(header, child, pose, gm.TwistWithCovariance(gm.Twist.planar(*velocity), variances))
+    return Odometry(
+        header, child, pose, gm.TwistWithCovariance(gm.Twist.planar(*velocity), variances)
+    )
 
 
 def transform(header: Header, child: str, position: XYZ, rotation: XYZW) -> gm.TransformStamped:
     """The pose of the frame `child` in the frame of `header`."""
-    return gm.TransformStamped(header, child, gm.Transform(gm.Vector3(*position), gm.Quaternion(*rotation)))
+    return gm.TransformStamped(
+        header, child, gm.Transform(gm.Vector3(*position), gm.Quaternion(*rotation))
+    )
 
 
 class RobotFeedback(Latest[Odometry]):
-    """The newest odometry on `key`, for a driver, which has to know when its robot is another one, or starts again."""
+    """The newest odometry on `key`, for a driver, which has to know when its robot is another one,
+    or starts again.
+    """
 
     def __init__(self, bus: Bus, key: str) -> None:
         super().__init__(bus.state(key, Odometry))
@@ -66,25 +78,29 @@ class RobotFeedback(Latest[Odometry]):
     def rests(self, since: float) -> bool:
         """Whether what was received after `since` (s, monotonic) shows a robot at rest."""
         odom, age = self.read()
-        return odom is not None and time.monotonic() - age > since and odom.twist.twist.is_slow(RESTS)
+        return (
+            odom is not None and time.monotonic() - age > since and odom.twist.twist.is_slow(RESTS)
+        )
 
-    def was_removed(self) -> bool:
-        """Whether a publisher of its odom has left since the last call: it was removed, though another one may have
-        taken its place.
+    def poll_removed(self) -> bool:
+        """Whether a publisher of its odom has left since the last call: it was removed, though
+        another one may have taken its place.
         """
         tokens = list(iter(self._writers.try_recv, None))
         return any(token.is_deletion for token in tokens)
 
-    def was_reset(self) -> bool:
-        """Whether the robot has been reset since the last call: a new epoch of the sim began, the robot's clock went
-        back, or its position jumped.
+    def poll_reset(self) -> bool:
+        """Whether the robot has been reset since the last call: a new epoch of the sim began, the
+        robot's clock went back, or its position jumped.
         """
         sim, _ = self._sim.read()
         epoch, self._epoch = self._epoch, sim.epoch if sim else None
         before, self._before = self._before, self.read()[0]
         if epoch is not None and epoch != self._epoch:
             return True
-        return before is not None and self._before is not None and _starts_again(before, self._before)
+        return (
+            before is not None and self._before is not None and _starts_again(before, self._before)
+        )
 
     def close(self) -> None:
         """Stop listening."""
@@ -97,5 +113,7 @@ def _starts_again(before: Odometry, now: Odometry) -> bool:
     """Whether the clock went back, or the robot is farther away than it can have driven."""
     seconds = now.header.stamp.seconds() - before.header.stamp.seconds()
     (x0, y0, _), (x, y, _) = before.pose.pose.planar(), now.pose.pose.planar()
-    speed = max(math.hypot(odom.twist.twist.linear.x, odom.twist.twist.linear.y) for odom in (before, now))
+    speed = max(
+        math.hypot(odom.twist.twist.linear.x, odom.twist.twist.linear.y) for odom in (before, now)
+    )
     return seconds < 0 or math.hypot(x - x0, y - y0) > JUMP + 2 * speed * seconds

@@ -1,7 +1,8 @@
-"""Pictures as text: a canvas of braille dots, numbers over time (`panels`), and the plane from above (`draw`).
+"""Pictures as text: a canvas of braille dots, numbers over time (`panels`), and the plane from
+above (`draw`).
 
-Pure: points in, lines out. Metres, radians, seconds; on the plane x points east (right) and y north (up). Braille dots
-are equally far apart in both directions if characters are twice as high as wide.
+Pure: points in, lines out. Metres, radians, seconds; on the plane x points east (right) and y north
+(up). Braille dots are equally far apart in both directions if characters are twice as high as wide.
 """
 
 import math
@@ -11,10 +12,12 @@ from typing import NamedTuple
 
 Point = tuple[float, float]
 
-# Unicode's numbering of the dots of a braille character: 1 2 3 7 down the left, 4 5 6 8 down the right.
+# Unicode's numbering of the dots of a braille character: 1 2 3 7 down the left, 4 5 6 8 down the
+# right.
 _BITS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
 _UPPER, _LOWER = 0x1B, 0xE4  # the two top rows of dots, and the two bottom ones
-_BRAILLE = [" ", *map(chr, range(0x2801, 0x2900))]  # fonts draw the empty pattern as rings, or not at all
+# fonts draw the empty pattern as rings, or not at all
+_BRAILLE = [" ", *map(chr, range(0x2801, 0x2900))]
 _ASCII = [" '.:"[bool(dots & _UPPER) + 2 * bool(dots & _LOWER)] for dots in range(256)]
 
 
@@ -47,18 +50,25 @@ class Canvas:
     def lines(self, ascii: bool = False) -> list[str]:
         """The picture, one string a row, each `columns` long."""
         drawn = [glyph(dots, ascii) for dots in self.cells]
-        return ["".join(drawn[row * self.columns : (row + 1) * self.columns]) for row in range(self.rows)]
+        return [
+            "".join(drawn[row * self.columns : (row + 1) * self.columns])
+            for row in range(self.rows)
+        ]
 
 
 def glyph(dots: int, ascii: bool = False) -> str:
-    """The character for the dots of one cell. In ASCII it distinguishes only the upper and the lower half."""
+    """The character for the dots of one cell. In ASCII it distinguishes only the upper and the
+    lower half.
+    """
     return (_ASCII if ascii else _BRAILLE)[dots]
 
 
 def _clip(
     x0: float, y0: float, x1: float, y1: float, right: float, bottom: float
 ) -> tuple[float, float, float, float] | None:
-    """The part of a line inside [0, right] x [0, bottom], by Liang and Barsky; None if there is none."""
+    """The part of a line inside [0, right] x [0, bottom], by Liang and Barsky; None if there is
+    none.
+    """
     dx, dy = x1 - x0, y1 - y0
     enter, leave = 0.0, 1.0
     for slope, room in ((-dx, x0), (dx, right - x0), (-dy, y0), (dy, bottom - y0)):
@@ -80,7 +90,11 @@ LEAST_ROWS = 3  # of a panel: its title, and two of picture
 
 
 def panels(
-    series: Mapping[str, Sequence[Point]], now: float, window: float, size: tuple[int, int], ascii: bool = False
+    series: Mapping[str, Sequence[Point]],
+    now: float,
+    window: float,
+    size: tuple[int, int],
+    ascii: bool = False,
 ) -> list[str]:
     """One panel for each name, stacked, over the last `window` seconds. `size`: columns and rows.
 
@@ -105,13 +119,21 @@ def _panel(
     low, high = _range([value for _, value in points])
     canvas = Canvas(columns - LABEL, rows - 1)
     right, bottom = canvas.width - 1, canvas.height - 1
-    dots = [(right * (1 - (now - t) / window), bottom * (high - v) / (high - low)) for t, v in points]
+    dots = [
+        (right * (1 - (now - t) / window), bottom * (high - v) / (high - low)) for t, v in points
+    ]
     for (x0, y0), (x1, y1) in zip(dots, dots[1:] or dots, strict=False):
         canvas.line(x0, y0, x1, y1)
     labels = [""] * (rows - 1)
     labels[0], labels[-1] = _short(high), _short(low)
     title = f"{name}: {points[-1][1]:.6g}"
-    return [title, *(f"{label:>{LABEL - 1}} {row}" for label, row in zip(labels, canvas.lines(ascii), strict=True))]
+    return [
+        title,
+        *(
+            f"{label:>{LABEL - 1}} {row}"
+            for label, row in zip(labels, canvas.lines(ascii), strict=True)
+        ),
+    ]
 
 
 def _range(values: list[float]) -> tuple[float, float]:
@@ -135,7 +157,8 @@ def _short(value: float) -> str:
 FARTHEST = 1e6  # m; farther points are not drawn
 STEP = 12  # dots from one point of the grid to the next; a whole number of characters both ways
 FINEST = 0.5  # m between the points of the grid, at least
-ARROW = ((5.0, 0.0), (4.0, 2.5), (4.0, -2.5))  # dots and radians from the centre: tip, and the two ends of the tail
+# dots and radians from the centre: tip, and the two ends of the tail
+ARROW = ((5.0, 0.0), (4.0, 2.5), (4.0, -2.5))
 MARGIN = 6  # dots around everything, for letters and names
 ARROWS = "→↗↑↖←↙↓↘"
 ASCII_ARROWS = ">/^\\<,v."
@@ -172,9 +195,12 @@ def draw(plane: Plane, size: tuple[int, int], ascii: bool = False) -> list[str]:
     return ["".join(character for _, character in row) for row in rows] + [caption]
 
 
-def drawn(plane: Plane, size: tuple[int, int], ascii: bool = False, grid: bool = False) -> tuple[list[list[Cell]], str]:
-    """As `draw`, but as cells and the caption. With `grid` there is a dot at every step of a grid, whose length is the
-    caption, and robots are arrows of dots, which show the heading to a few degrees but no name.
+def drawn(
+    plane: Plane, size: tuple[int, int], ascii: bool = False, grid: bool = False
+) -> tuple[list[list[Cell]], str]:
+    """As `draw`, but as cells and the caption. With `grid` there is a dot at every step of a grid,
+    whose length is the caption, and robots are arrows of dots, which show the heading to a few
+    degrees but no name.
     """
     columns, rows = size[0], size[1] - 1
     view = _View(columns, rows, list(_points(plane)))
@@ -183,7 +209,9 @@ def drawn(plane: Plane, size: tuple[int, int], ascii: bool = False, grid: bool =
         view.mark(points)
     for robot in plane.robots:
         dots = [view.place(point) for point in robot.trail if _is_near(point)]
-        for start, end in pairwise(dot for dot, _ in groupby((round(x), round(y)) for x, y in dots)):
+        for start, end in pairwise(
+            dot for dot, _ in groupby((round(x), round(y)) for x, y in dots)
+        ):
             trails.line(*start, *end)
         if grid and not ascii and _is_near((robot.x, robot.y)) and math.isfinite(robot.yaw):
             _arrow(arrows, *view.place((robot.x, robot.y)), robot.yaw)
@@ -199,8 +227,13 @@ def drawn(plane: Plane, size: tuple[int, int], ascii: bool = False, grid: bool =
         _put(lines, view, point, ASCII_OBJECT if ascii else OBJECT)
     robots = plane.robots if ascii or not grid else ()
     for robot in robots:
-        _put(lines, view, (robot.x, robot.y), (ASCII_ARROWS if ascii else ARROWS)[_eighth(robot.yaw)])
-    for name, point in [*((robot.name, (robot.x, robot.y)) for robot in robots), *plane.objects.items()]:
+        _put(
+            lines, view, (robot.x, robot.y), (ASCII_ARROWS if ascii else ARROWS)[_eighth(robot.yaw)]
+        )
+    for name, point in [
+        *((robot.name, (robot.x, robot.y)) for robot in robots),
+        *plane.objects.items(),
+    ]:
         _label(lines, view, point, name)
     return lines, f"grid {view.step:g} m" if grid else _caption(plane, view, columns, ascii)
 
@@ -208,7 +241,8 @@ def drawn(plane: Plane, size: tuple[int, int], ascii: bool = False, grid: bool =
 class _View:
     """Metres to dots: the same scale both ways, with everything in view.
 
-    Its centre lies on the grid and its scale is a round number, so the picture does not move with the robot.
+    Its centre lies on the grid and its scale is a round number, so the picture does not move with
+    the robot.
     """
 
     def __init__(self, columns: int, rows: int, points: list[Point]) -> None:
@@ -219,7 +253,10 @@ class _View:
         for self.step in _steps(FINEST) if spans else ():
             x, y = (round((low + high) / 2 / self.step) * self.step for low, high in spans)
             self.centre = x, y
-            reach = [max(high - middle, middle - low) for (low, high), middle in zip(spans, (x, y), strict=True)]
+            reach = [
+                max(high - middle, middle - low)
+                for (low, high), middle in zip(spans, (x, y), strict=True)
+            ]
             if all(far * self.scale <= half for far, half in zip(reach, halves, strict=True)):
                 break
 
@@ -230,7 +267,9 @@ class _View:
 
     def place(self, point: Point) -> Point:
         """The dot of a point; y points down there."""
-        x, y = ((value - centre) * self.scale for value, centre in zip(point, self.centre, strict=True))
+        x, y = (
+            (value - centre) * self.scale for value, centre in zip(point, self.centre, strict=True)
+        )
         return self.columns + x, 2 * self.rows - y
 
     def mark(self, canvas: Canvas) -> None:
@@ -241,7 +280,9 @@ class _View:
 
 
 def _arrow(canvas: Canvas, x: float, y: float, yaw: float) -> None:
-    corners = [(x + far * math.cos(yaw + angle), y - far * math.sin(yaw + angle)) for far, angle in ARROW]
+    corners = [
+        (x + far * math.cos(yaw + angle), y - far * math.sin(yaw + angle)) for far, angle in ARROW
+    ]
     for corner in corners[1:]:
         canvas.line(*corners[0], *corner)
         canvas.line(x, y, *corner)
@@ -260,7 +301,11 @@ def _cell(arrow: int, trail: int, grid: int, ascii: bool) -> Cell:
 
 
 def _points(plane: Plane) -> Iterable[Point]:
-    everything = [*plane.goals, *plane.objects.values(), *((robot.x, robot.y) for robot in plane.robots)]
+    everything = [
+        *plane.goals,
+        *plane.objects.values(),
+        *((robot.x, robot.y) for robot in plane.robots),
+    ]
     everything += plane.seen
     for robot in plane.robots:
         everything += robot.trail
@@ -292,8 +337,8 @@ def _put(lines: list[list[Cell]], view: _View, point: Point, sign: str) -> None:
 
 
 def _label(lines: list[list[Cell]], view: _View, point: Point, name: str) -> None:
-    """Write a name beside the sign at a point, right or left of it, or else in the nearest row with room, so that it
-    covers no other sign or name. It is cut only if it is longer than a row.
+    """Write a name beside the sign at a point, right or left of it, or else in the nearest row with
+    room, so that it covers no other sign or name. It is cut only if it is longer than a row.
     """
     if not name or not (place := _place(lines, view, point)):
         return

@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import NoReturn
 
-from holozen.console import drain, give_up_readers
+from holozen.console import drain, give_up_readers, report
+from holozen.system import IS_LINUX
 
 _PR_SET_PDEATHSIG = 1  # prctl(2)
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -20,8 +21,11 @@ INTERRUPTED = 130  # the exit code after Ctrl-C, as of shells
 
 
 def stop_event() -> threading.Event:
-    """An event that SIGINT, SIGTERM and SIGHUP set. `wait` on it instead of sleeping."""
+    """An event that SIGINT, SIGTERM and SIGHUP set, and the death of a thread. `wait` on it instead
+    of sleeping.
+    """
     stop = threading.Event()
+    threading.excepthook = _ThreadDeath(stop)
 
     def end(_number: int, _frame: FrameType | None) -> None:
         give_up_readers()
@@ -33,16 +37,39 @@ def stop_event() -> threading.Event:
     return stop
 
 
+class _ThreadDeath:
+    """As threading.excepthook: sets `stop` when an exception ends a thread, and lets the process
+    fail. Without that thread it would go on and look well, but do only a part of its work.
+    """
+
+    def __init__(self, stop: threading.Event) -> None:
+        hook = threading.excepthook
+        self._before: Callable[[threading.ExceptHookArgs], object]
+        self._before = hook._before if isinstance(hook, _ThreadDeath) else hook
+        self._stop = stop
+
+    def __call__(self, args: "threading.ExceptHookArgs") -> None:
+        self._before(args)
+        name = args.thread.name if args.thread else "a thread"
+        report(
+            f"{name} ended by {args.exc_type.__name__}: {args.exc_value}; this process ends with it"
+        )
+        Ending.failed = True
+        self._stop.set()
+
+
 def wait_for_end(stop: threading.Event) -> None:
-    """Wait until `stop` is set. It polls, since a signal just before a wait does not interrupt it."""
+    """Wait until `stop` is set. It polls, since a signal just before a wait does not interrupt
+    it.
+    """
     while not stop.wait(POLL):
         pass
 
 
 @contextlib.contextmanager
 def deferred_interrupt() -> Iterator[None]:
-    """Delay the KeyboardInterrupt of a Ctrl-C to the end of the block. For importing messages: during the import of
-    msgspec it would be lost, or crash the process.
+    """Delay the KeyboardInterrupt of a Ctrl-C to the end of the block. For importing messages:
+    during the import of msgspec it would be lost, or crash the process.
     """
     caught: list[int] = []
     main = threading.current_thread() is threading.main_thread()
@@ -59,8 +86,8 @@ def deferred_interrupt() -> Iterator[None]:
 
 
 def interrupt_again(unraisable: "sys.UnraisableHookArgs") -> None:
-    """As sys.unraisablehook: a Ctrl-C in a callback of the interpreter, such as each import has, would be lost. It
-    interrupts what runs next.
+    """As sys.unraisablehook: a Ctrl-C in a callback of the interpreter, such as each import has,
+    would be lost. It interrupts what runs next.
     """
     if unraisable.exc_type is not KeyboardInterrupt:
         sys.__unraisablehook__(unraisable)
@@ -69,16 +96,18 @@ def interrupt_again(unraisable: "sys.UnraisableHookArgs") -> None:
 
 
 class Ending:
-    """Ends a process that has opened Zenoh sessions: as Python does, but without finalizing the interpreter.
+    """Ends a process that has opened Zenoh sessions: as Python does, but without finalizing the
+    interpreter.
 
-    Zenoh's own threads run on after its sessions are closed. One that enters Python while the interpreter is being
-    finalized aborts the process, and one that uses statics that the C library has destroyed by then panics
-    (eclipse-zenoh/zenoh#1904). So the last callback of atexit ends the process. Callbacks run in the
-    reverse order of their registration: make the Ending before anything else registers one. `of_verb`: the process runs
-    one `holozen VERB`, and ends with it.
+    Zenoh's own threads run on after its sessions are closed. One that enters Python while the
+    interpreter is being finalized aborts the process, and one that uses statics that the C library
+    has destroyed by then panics (eclipse-zenoh/zenoh#1904). So the last callback of atexit ends the
+    process. Callbacks run in the reverse order of their registration: make the Ending before
+    anything else registers one. `of_verb`: the process runs one `holozen VERB`, and ends with it.
+    `failed`: a thread of it died, so that its exit code is not 0.
     """
 
-    of_verb = False
+    of_verb = failed = False
 
     def __init__(self, *, of_verb: bool = False) -> None:
         Ending.of_verb = of_verb
@@ -87,7 +116,10 @@ class Ending:
         atexit.register(self._end)
 
     def leave(self, code: int | str | None) -> NoReturn:
-        """Exit, once all non-daemon threads and the callbacks of atexit are done. Ctrl-C ends that wait."""
+        """Exit, once all non-daemon threads and the callbacks of atexit are done. Ctrl-C ends that
+        wait.
+        """
+        code = code or int(Ending.failed)
         self.code = code if isinstance(code, int) else int(code is not None)
         before = signal.getsignal(signal.SIGINT)
         if callable(before):
@@ -106,14 +138,17 @@ class Ending:
             return
         drain()
         for stream in (sys.stdout, sys.stderr):
-            with contextlib.suppress(OSError, ValueError, AttributeError):  # it is gone, closed or never existed
+            # it is gone, closed or never existed
+            with contextlib.suppress(OSError, ValueError, AttributeError):
                 stream.flush()
         os._exit(self.code)
 
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
-    """Discard what code that is not Python's prints to stderr, and all else that is printed there."""
+    """Discard what code that is not Python's prints to stderr, and all else that is printed
+    there.
+    """
     saved, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 2)
     try:
@@ -125,9 +160,12 @@ def quiet() -> Iterator[None]:
 
 
 def dies_with_parent() -> Callable[[], None]:
-    """For subprocess's `preexec_fn`: have the kernel end the child when the thread that started it ends, at the latest
-    when this process is killed.
+    """For subprocess's `preexec_fn`: have the kernel end the child when the thread that started it
+    ends, at the latest when this process is killed. macOS has nothing of the kind: there a killed
+    parent leaves its children.
     """
+    if not IS_LINUX:
+        return lambda: None
     import ctypes
 
     libc = ctypes.CDLL(None)  # here, and not in the child: an import between fork and exec may hang

@@ -1,7 +1,7 @@
 """Rotations and rigid transforms in plain floats: no numpy, no clock.
 
-Metres and radians. Quaternions are x, y, z, w, as in geometry_msgs, and have length 1 unless a docstring says
-otherwise. Matrices, and rotations of whole arrays, are in holozen/robot/rotation.py.
+Metres and radians. Quaternions are x, y, z, w, as in geometry_msgs, and have length 1 unless a
+docstring says otherwise. Matrices, and rotations of whole arrays, are in holozen/robot/rotation.py.
 """
 
 import math
@@ -44,7 +44,11 @@ def multiply(a: XYZW, b: XYZW) -> XYZW:
 def rotate(q: XYZW, v: XYZ) -> XYZ:
     """A vector rotated by q."""
     x, y, z, w = q
-    tx, ty, tz = 2.0 * (y * v[2] - z * v[1]), 2.0 * (z * v[0] - x * v[2]), 2.0 * (x * v[1] - y * v[0])
+    tx, ty, tz = (
+        2.0 * (y * v[2] - z * v[1]),
+        2.0 * (z * v[0] - x * v[2]),
+        2.0 * (x * v[1] - y * v[0]),
+    )
     return (
         v[0] + w * tx + y * tz - z * ty,
         v[1] + w * ty + z * tx - x * tz,
@@ -75,8 +79,12 @@ def from_axis_angle(axis: XYZ, angle: float) -> XYZW:
 
 
 def from_rpy(roll: float, pitch: float, yaw: float) -> XYZW:
-    """The quaternion of URDF's angles: roll about the fixed x axis, then pitch about y, then yaw about z."""
-    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(angle / 2), math.sin(angle / 2)) for angle in (roll, pitch, yaw))
+    """The quaternion of URDF's angles: roll about the fixed x axis, then pitch about y, then yaw
+    about z.
+    """
+    (cr, sr), (cp, sp), (cy, sy) = (
+        (math.cos(angle / 2), math.sin(angle / 2)) for angle in (roll, pitch, yaw)
+    )
     return (
         sr * cp * cy - cr * sp * sy,
         cr * sp * cy + sr * cp * sy,
@@ -86,7 +94,9 @@ def from_rpy(roll: float, pitch: float, yaw: float) -> XYZW:
 
 
 def to_rpy(q: XYZW) -> XYZ:
-    """Roll, pitch and yaw, the inverse of `from_rpy`; roll is 0 where x points straight up or down."""
+    """Roll, pitch and yaw, the inverse of `from_rpy`; roll is 0 where x points straight up or
+    down.
+    """
     x, y, z, w = q
     level = math.hypot(w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z))
     pitch = math.atan2(2.0 * (w * y - x * z), level)
@@ -117,15 +127,22 @@ class Quaternion(Vector, Protocol):
 
 
 class Transform(Struct, frozen=True):
-    """A rigid transform, which takes points of a child frame into its parent: rotate, then translate."""
+    """A rigid transform, which takes points of a child frame into its parent: rotate, then
+    translate.
+    """
 
     translation: XYZ = (0.0, 0.0, 0.0)
     rotation: XYZW = IDENTITY
 
     @classmethod
     def of(cls, translation: Vector, rotation: Quaternion) -> "Transform":
-        """From two messages: a Pose's position and orientation, or a Transform's translation and rotation."""
-        return cls((translation.x, translation.y, translation.z), (rotation.x, rotation.y, rotation.z, rotation.w))
+        """From two messages: a Pose's position and orientation, or a Transform's translation and
+        rotation.
+        """
+        return cls(
+            (translation.x, translation.y, translation.z),
+            (rotation.x, rotation.y, rotation.z, rotation.w),
+        )
 
     def __matmul__(self, inner: "Transform") -> "Transform":
         """The composition: `inner` is applied first."""
@@ -144,5 +161,7 @@ class Transform(Struct, frozen=True):
 
     def interpolate(self, other: "Transform", fraction: float) -> "Transform":
         """The transform at `fraction` (0 to 1) of the way to another one."""
-        x, y, z = (i + fraction * (j - i) for i, j in zip(self.translation, other.translation, strict=True))
+        x, y, z = (
+            i + fraction * (j - i) for i, j in zip(self.translation, other.translation, strict=True)
+        )
         return Transform((x, y, z), slerp(self.rotation, other.rotation, fraction))

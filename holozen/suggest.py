@@ -11,31 +11,38 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pathlib import Path
 
-LONGEST = 80  # characters of a name or a value in a message
+MAX_SHOWN = 80  # characters of a name or a value in a message
 MAX_NAMES = 1000  # names that are compared with one
 ROBOT_FILES = {".xacro", ".urdf", ".sdf", ".world"}
 
 
-def suggest(word: str, known: Iterable[str], part: Callable[[str], str] = str, alike: float = 0.65) -> str:
-    """` (did you mean 'x'?)` with the name that is `closest` to `word`, for the end of a message; else empty."""
+def suggest(
+    word: str, known: Iterable[str], part: Callable[[str], str] = str, alike: float = 0.65
+) -> str:
+    """` (did you mean 'x'?)` with the name that is `closest` to `word`, for the end of a message;
+    else empty.
+    """
     best = closest(word, known, part, alike)
     return f" (did you mean {shorten(best)!r}?)" if best else ""
 
 
-def closest(word: str, known: Iterable[str], part: Callable[[str], str] = str, alike: float = 0.65) -> str:
+def closest(
+    word: str, known: Iterable[str], part: Callable[[str], str] = str, alike: float = 0.65
+) -> str:
     """The `known` name most similar to `word`; empty if none is.
 
-    `alike` is the similarity required, from 0 to 1; a match of a name's start counts nearly as much as one of the
-    whole, a match inside it somewhat less. Case is ignored; `part` returns the part of each name that is compared.
+    `alike` is the similarity required, from 0 to 1; a match of a name's start counts nearly as much
+    as one of the whole, a match inside it somewhat less. Case is ignored; `part` returns the part
+    of each name that is compared.
     """
     from difflib import SequenceMatcher
 
-    if not (plain := part(word).casefold()[:LONGEST]):
+    if not (plain := part(word).casefold()[:MAX_SHOWN]):
         return ""
     matcher = SequenceMatcher(None, "", plain)
 
     def likeness(name: str) -> float:
-        other = part(name).casefold()[:LONGEST]
+        other = part(name).casefold()[:MAX_SHOWN]
         found = 0.7 if len(plain) > 2 and plain in other else 0.0
         for text, share in ((other, 1.0), (other[: len(plain)] if len(plain) > 1 else "", 0.95)):
             matcher.set_seq1(text)
@@ -52,8 +59,9 @@ def closest(word: str, known: Iterable[str], part: Callable[[str], str] = str, a
 
 
 def suggest_file(path: Path) -> str:
-    """` (did you mean 'my_bot.urdf.xacro'?)` for a missing robot or world file: the most similar one in its folder and
-    among those that come with holozen; empty if there is none, or if the file exists.
+    """` (did you mean 'my_bot.urdf.xacro'?)` for a missing robot or world file: the most similar
+    one in its folder and among those that come with holozen; empty if there is none, or if the file
+    exists.
     """
     from pathlib import Path
 
@@ -82,18 +90,20 @@ def last_part(name: str) -> str:
     return name.rpartition("/")[2]
 
 
-def shorten(text: str, most: int = LONGEST) -> str:
+def shorten(text: str, most: int = MAX_SHOWN) -> str:
     """`text`, truncated to `most` characters."""
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
-def cut(text: str, most: int = LONGEST) -> str:
+def cut(text: str, most: int = MAX_SHOWN) -> str:
     """`text` in quotes, truncated to `most` characters."""
     return repr(shorten(text, most))
 
 
 def listed(names: Iterable[str], most: int = 12) -> str:
-    """The sorted names as one phrase, cut after `most` of them: a message stays one readable line."""
+    """The sorted names as one phrase, cut after `most` of them: a message stays one readable
+    line.
+    """
     names = sorted(names)
     shown = ", ".join(shorten(name) for name in names[:most])
     return shown + f" and {len(names) - most} more" if len(names) > most else shown or "none"

@@ -1,17 +1,21 @@
-"""Ctrl-Z for a process whose children are in groups of their own, where the terminal's signal does not reach them."""
+"""Ctrl-Z for a process whose children are in groups of their own, where the terminal's signal does
+not reach them.
+"""
 
 import contextlib
 import os
 import signal
 import subprocess
-from pathlib import Path
 from types import FrameType
+
+from holozen.system import parents
 
 GUARD = 'read -r _; kill -CONT "$@"'  # at the end of its input
 
 
 def suspend_children_too() -> None:
-    """Have a SIGTSTP suspend all processes below this one, and then this one; they go on when it does.
+    """Have a SIGTSTP suspend all processes below this one, and then this one; they go on when it
+    does.
 
     Where SIGTSTP is ignored it stays so.
     """
@@ -21,14 +25,16 @@ def suspend_children_too() -> None:
 
 def _suspend(_number: int, _frame: FrameType | None) -> None:
     stopped: set[int] = set()
-    while new := {*_below(os.getpid())} - stopped:  # again, since some may have been starting others
+    # again, since some may have been starting others
+    while new := {*_below(os.getpid())} - stopped:
         for pid in new:
             with contextlib.suppress(OSError):  # it has ended
-                # One in our own group is at the terminal, which it has to restore first. In a group without a shell
-                # SIGTSTP does nothing.
+                # One in our own group is at the terminal, which it has to restore first. In a group
+                # without a shell SIGTSTP does nothing.
                 os.kill(pid, signal.SIGTSTP if os.getpgid(pid) == os.getpgrp() else signal.SIGSTOP)
         stopped |= new
-    # Of a process that is killed meanwhile the children would be suspended for ever: SIGTERM waits until SIGCONT.
+    # Of a process that is killed meanwhile the children would be suspended for ever: SIGTERM waits
+    # until SIGCONT.
     with contextlib.ExitStack() as guarded:
         with contextlib.suppress(OSError):
             guarded.enter_context(_guard(stopped))
@@ -59,11 +65,8 @@ def _stop() -> None:
 def _below(ancestor: int) -> list[int]:
     """The processes below one that have not ended."""
     children: dict[int, list[int]] = {}
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError, ValueError):  # it has ended
-            state, parent = path.read_text(errors="replace").rpartition(")")[2].split()[:2]
-            if state != "Z":
-                children.setdefault(int(parent), []).append(int(path.parent.name))
+    for process, parent in parents():
+        children.setdefault(parent, []).append(process)
     found: list[int] = []
     look = [ancestor]
     while look:

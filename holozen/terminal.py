@@ -7,7 +7,8 @@ import select
 import time
 from collections.abc import Iterator
 
-ASK_KEYBOARD, ASK_TERMINAL = "\x1b[?u", "\x1b[c"  # the Kitty protocol's query, and DA1, which every terminal answers
+# the Kitty protocol's query, and DA1, which every terminal answers
+ASK_KEYBOARD, ASK_TERMINAL = ("\x1b[?u", "\x1b[c")
 PATIENCE = 1.0  # s for an answer; a slow line, or a busy machine, takes its time
 _KEYBOARD, _TERMINAL = re.compile(rb"\x1b\[\?\d+u"), re.compile(rb"\x1b\[\?[\d;]*c")
 

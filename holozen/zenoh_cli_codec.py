@@ -1,9 +1,9 @@
-"""The decoder `holozen` of PyPI's zenoh-cli: one readable line for JSON, msgpack and CDR alike.
+"""The decoder `holozen` of PyPI's zenoh-cli: one readable line for JSON and CDR alike.
 
     zenoh subscribe -k odom --decoder holozen
 
-zenoh-cli passes the key and the payload to a decoder, but not the Encoding, so the first byte of the payload decides.
-CDR does not contain its type, which is known for the keys of `holozen.wire`.
+zenoh-cli passes the key and the payload to a decoder, but not the Encoding, so the first byte of
+the payload decides. CDR does not contain its type, which is known for the keys of `holozen.wire`.
 """
 
 import json
@@ -29,10 +29,7 @@ def _value(key: str, payload: bytes) -> Any:
     """The content as plain values. Raises ValueError."""
     if payload[:1] == b"\0":
         return _cdr(key, payload)
-    try:
-        text = payload.decode()
-    except UnicodeDecodeError:
-        return _msgpack(payload)
+    text = payload.decode()
     try:
         return json.loads(text)
     except ValueError:
@@ -52,17 +49,10 @@ def _cdr(key: str, payload: bytes) -> Any:
     return msgspec.to_builtins(codec.decode(payload, codec.WIRES["cdr"], types))
 
 
-def _msgpack(payload: bytes) -> Any:
-    import msgspec
-
-    value = msgspec.msgpack.decode(payload)
-    if not isinstance(value, dict | list):  # nearly any byte is a number in msgpack
-        raise ValueError("not a message")
-    return value
-
-
 def _line(value: Any) -> str:
-    return " ".join(_parts(value, "")) if isinstance(value, dict | list) and value else _scalar(value)
+    return (
+        " ".join(_parts(value, "")) if isinstance(value, dict | list) and value else _scalar(value)
+    )
 
 
 def _parts(value: Any, name: str, depth: int = 0) -> list[str]:
@@ -74,10 +64,16 @@ def _parts(value: Any, name: str, depth: int = 0) -> list[str]:
     if isinstance(value, dict) and list(value) in (["x", "y", "z"], ["x", "y", "z", "w"]):
         return [f"{name}=({', '.join(map(_scalar, value.values()))})"]
     if isinstance(value, dict) and value:
-        rows = [_parts(inner, f"{name}.{field}" if name else str(field), depth + 1) for field, inner in value.items()]
+        rows = [
+            _parts(inner, f"{name}.{field}" if name else str(field), depth + 1)
+            for field, inner in value.items()
+        ]
         return [part for row in rows for part in row]
     if isinstance(value, list) and any(isinstance(inner, dict | list) for inner in value):
-        rows = [_parts(inner, f"{name}[{index}]", depth + 1) for index, inner in enumerate(value[:MAX_ITEMS])]
+        rows = [
+            _parts(inner, f"{name}[{index}]", depth + 1)
+            for index, inner in enumerate(value[:MAX_ITEMS])
+        ]
         return [part for row in rows for part in row] + _rest(name, value)
     return [f"{name}={_scalar(value)}"]
 

@@ -1,4 +1,6 @@
-"""What the site has besides docs/: the README is its first page, and each file that a page links to becomes a page."""
+"""What the site has besides docs/: pages from elsewhere in the repository, and each file that a
+page links to.
+"""
 
 import re
 from pathlib import Path, PurePosixPath
@@ -12,12 +14,13 @@ from pymdownx.slugs import slugify
 
 REPO = Path(__file__).parents[1]
 PAGES = {
-    "README.md": "index.md",
     "CONTRIBUTING.md": "contributing.md",
     "CHANGELOG.md": "changelog.md",
-    "benchmarks/README.md": "benchmarks.md",
+    "examples/fleet/README.md": "fleet.md",
 }
-LINK = re.compile(r"(?P<before>\]\(|(?:src|href)=\")(?P<path>[^)\"#\s:]+)(?P<after>#[^)\"\s]*)?(?=[)\"])")
+LINK = re.compile(
+    r"(?P<before>\]\(|(?:src|href)=\")(?P<path>[^)\"#\s:]+)(?P<after>#[^)\"\s]*)?(?=[)\"])"
+)
 UNSEARCHED = "---\nsearch: {exclude: true}\n---\n"
 LANGUAGES = {".world": "xml", ".xacro": "xml", ".svg": "xml", ".json5": "json"}
 
@@ -29,7 +32,10 @@ def on_config(config: MkDocsConfig) -> None:
 
 def source(page: File) -> Path:
     """The path, in the repository, of the file that a page is made from."""
-    return next((Path(path) for path, uri in PAGES.items() if uri == page.src_uri), Path("docs", page.src_uri))
+    return next(
+        (Path(path) for path, uri in PAGES.items() if uri == page.src_uri),
+        Path("docs", page.src_uri),
+    )
 
 
 def place(path: PurePosixPath) -> str:
@@ -44,7 +50,11 @@ def place(path: PurePosixPath) -> str:
 def targets(text: str, folder: Path) -> list[tuple[re.Match[str], PurePosixPath]]:
     """The links of a page, each with the path in the repository that it leads to."""
     code = [block.span() for block in re.finditer(r"^```.*?^```$|`[^`\n]+`", text, re.M | re.S)]
-    found = [link for link in LINK.finditer(text) if not any(start <= link.start() < end for start, end in code)]
+    found = [
+        link
+        for link in LINK.finditer(text)
+        if not any(start <= link.start() < end for start, end in code)
+    ]
     paths = [(REPO / folder / link["path"]).resolve().relative_to(REPO) for link in found]
     return [(link, PurePosixPath(path)) for link, path in zip(found, paths, strict=True)]
 
@@ -52,7 +62,11 @@ def targets(text: str, folder: Path) -> list[tuple[re.Match[str], PurePosixPath]
 def on_files(files: Files, config: MkDocsConfig) -> None:
     for path, uri in PAGES.items():
         files.append(File.generated(config, uri, content=(REPO / path).read_text()))
-    files.append(File.generated(config, "files/meshes/logo.png", content=(REPO / "meshes/logo.png").read_bytes()))
+    files.append(
+        File.generated(
+            config, "files/meshes/logo.png", content=(REPO / "meshes/logo.png").read_bytes()
+        )
+    )
     for page in list(files.documentation_pages()):
         for _, target in targets(page.content_string, source(page).parent):
             uri, file = place(target), REPO / target

@@ -1,7 +1,7 @@
 """The table of docs/cli.md, made from the parsers of the command line."""
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from holozen import cli
@@ -11,9 +11,9 @@ from holozen.flags import Instead
 LEFT_OUT = ("zenoh", ROS2_TITLE)  # groups of flags that many verbs have
 
 
-def table() -> str:
+def table(verbs: Iterable[str] = cli.VERBS) -> str:
     """A row for each verb: its command line, what it does, an example, its flags."""
-    rows = [_row(parser) for verb in cli.VERBS for parser in _parsers(cli.command(verb))]
+    rows = [_row(parser) for verb in verbs for parser in _parsers(cli.command(verb))]
     return "\n".join(["| command | does | flags |", "|---|---|---|", *rows])
 
 
@@ -36,7 +36,14 @@ def _row(parser: argparse.ArgumentParser) -> str:
     example = (parser.epilog or "").partition("example: ")[2]
     cell = f"{does}<br>`{example}`" if example else does
     return (
-        " | ".join((f"| `{_cell(' '.join([parser.prog, *places]))}`", _cell(cell), " ".join(map(_cell, flags)))) + " |"
+        " | ".join(
+            (
+                f"| `{_cell(' '.join([parser.prog, *places]))}`",
+                _cell(cell),
+                " ".join(map(_cell, flags)),
+            )
+        )
+        + " |"
     )
 
 

@@ -1,4 +1,6 @@
-"""The definitions of the Structs in holozen/messages, in the language of .msg, .srv and .action files."""
+"""The definitions of the Structs in holozen/messages, in the language of .msg, .srv and .action
+files.
+"""
 
 import importlib
 import pkgutil
@@ -23,10 +25,19 @@ def text() -> str:
     parts = ("Reply", "Result", "Feedback")  # after a request, or a goal
     kinds = (*(set(Message.__subclasses__()) - {ActionPart}), *ActionPart.__subclasses__())
     for kind in sorted(
-        kinds, key=lambda kind: next((parts.index(end) for end in parts if kind.__name__.endswith(end)), -1)
+        kinds,
+        key=lambda kind: next(
+            (parts.index(end) for end in parts if kind.__name__.endswith(end)), -1
+        ),
     ):
-        name, _, part = kind.ROS.rpartition("_") if "/action/" in kind.ROS else (kind.ROS, "", "Goal")
-        if kind.__module__.startswith(f"{holozen.messages.__name__}.") and part in ("Goal", "Result", "Feedback"):
+        name, _, part = (
+            kind.ROS.rpartition("_") if "/action/" in kind.ROS else (kind.ROS, "", "Goal")
+        )
+        if kind.__module__.startswith(f"{holozen.messages.__name__}.") and part in (
+            "Goal",
+            "Result",
+            "Feedback",
+        ):
             halves.setdefault(name, []).append("".join(f"{line}\n" for line in lines(kind)))
     return "\n".join(f"[{name}]\n" + "---\n".join(texts) for name, texts in sorted(halves.items()))
 
@@ -37,7 +48,9 @@ def lines(kind: type[Message]) -> Iterator[str]:
     for name in (name for name in vars(kind) if name.isupper() and name not in vars(Message)):
         yield f"{spelled(typing.get_args(hints[name])[0], kind)} {name}={getattr(kind, name)}"
     for field in msgspec.structs.fields(kind):
-        default = f" {field.default}" if field.default and field.default is not msgspec.NODEFAULT else ""
+        default = (
+            f" {field.default}" if field.default and field.default is not msgspec.NODEFAULT else ""
+        )
         yield f"{spelled(hints[field.name], kind)} {field.name}{default}"
 
 

@@ -9,7 +9,9 @@ SCRIPTS = Path(__file__).parents[1] / "scripts"
 
 
 def built(script: str) -> Path:
-    """Where its program is, or would be. Ask when a module is imported: tests get a cache folder of their own."""
+    """Where its program is, or would be. Ask when a module is imported: tests get a cache folder of
+    their own.
+    """
     asked = subprocess.run([SCRIPTS / script, "--path"], capture_output=True, text=True, check=True)
     return Path(asked.stdout.strip())
 
@@ -17,4 +19,6 @@ def built(script: str) -> Path:
 def needs(program: Path, script: str) -> None:
     """Skip the test if the program is not there."""
     if not program.exists():
-        pytest.skip(f"not built: scripts/{script} builds {program.name}, as scripts/test --long does")
+        pytest.skip(
+            f"not built: scripts/{script} builds {program.name}, as scripts/test --long does"
+        )

@@ -1,11 +1,13 @@
-"""Parts of the machine that a test needs: `scripts/parts` installs them in CI, elsewhere the test is skipped.
+"""Parts of the machine that a test needs: `scripts/parts` installs them in CI, elsewhere the test
+is skipped.
 
     @pytest.mark.needs("ip", "unshare")
 
-In CI (CI=true) every skip is a failure: a test that did not run has shown nothing. Only what is "not built: ..." may be
-missing, a program that cargo builds in minutes.
+In CI (CI=true) every skip is a failure: a test that did not run has shown nothing. Only what is
+"not built: ..." may be missing, a program that cargo builds in minutes.
 
-What is tried often, to be sure, is tried more often by `scripts/test --long`, which sets HOLOZEN_LONG=1:
+What is tried often, to be sure, is tried more often by `scripts/test --long`, which sets
+HOLOZEN_LONG=1:
 
     def test_it_stops(trials):
         for _ in range(trials(3, 20)):
@@ -24,7 +26,7 @@ import pytest
 
 from holozen import cli
 from holozen.process import SIGNALS, Ending
-from holozen.ros import packages
+from holozen.testing import Wire
 from holozen.testing.process import PATIENCE
 
 HERE = Path(__file__).parent
@@ -32,28 +34,45 @@ PACKAGES = dict(line.split(" ", 1) for line in (HERE / "packages.txt").read_text
 """Debian's packages of each command that a test may need."""
 
 IN_CI = os.environ.get("CI") == "true"
-QUICK = HERE / "unit"
-SLOW = {QUICK / "cli" / "test_stop_verb.py", QUICK / "teleop", QUICK / "transport", QUICK / "test_benchmarks.py"}
-"""Of these, what takes, or waits, as long as other tests."""
+CORE, EXTENSIONS = HERE / "core", HERE / "extensions"
+SLOW = {
+    CORE / "cli" / "test_stop_verb.py",
+    CORE / "teleop",
+    CORE / "transport",
+    CORE / "test_benchmarks.py",
+}
+"""Of these, what takes, or waits, as long as other tests; so do the folders ON_THE_WIRE of
+extensions.
+"""
+ON_THE_WIRE = {*EXTENSIONS.glob("*/wire"), *EXTENSIONS.glob("*/gateway")}
 SHARED = {"town", "fleet", "kiwi", "eye"}
-"""Fixtures of a file whose processes run, and cost time, from the first test that uses them until the file's last."""
-REORDERED = {HERE / "faults", HERE / "integration", HERE / "terminals"}
+"""Fixtures of a file whose processes run, and cost time, from the first test that uses them until
+the file's last.
+"""
+REORDERED = {HERE / "faults", HERE / "integration", HERE / "terminals", *ON_THE_WIRE}
 LONG = os.environ.get("HOLOZEN_LONG") == "1"
 
 
-os.environ["RUST_BACKTRACE"] = "0"  # a panic of Zenoh's is a line, as for users; a trace takes as long as a verb
+os.environ["RUST_BACKTRACE"] = (
+    "0"  # a panic of Zenoh's is a line, as for users; a trace takes as long as a verb
+)
 
 
 def pytest_configure(config: pytest.Config) -> None:
     # A run in the background, or under nohup, ignores these, and so would all that it starts.
-    for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
+    for number, handler in (
+        (signal.SIGINT, signal.default_int_handler),
+        (signal.SIGHUP, signal.SIG_DFL),
+    ):
         if signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, handler)
     config.addinivalue_line(
         "markers",
         "alone: measures time, or needs what keeps it; scripts/test runs it when little else does",
     )
-    config.addinivalue_line("markers", "engines: tried in each physics engine, by the fixture `engine` or a world")
+    config.addinivalue_line(
+        "markers", "engines: tried in each physics engine, by the fixture `engine` or a world"
+    )
     config.addinivalue_line("markers", f"needs(*commands): of {', '.join(PACKAGES)}")
 
 
@@ -68,13 +87,18 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     paths = dict.fromkeys(item.path for item in items)
 
     def is_quick(path: Path) -> bool:
-        return QUICK in path.parents and SLOW.isdisjoint((path, path.parent))
+        is_unit = CORE in path.parents or EXTENSIONS in path.parents
+        return is_unit and (SLOW | ON_THE_WIRE).isdisjoint((path, path.parent))
 
     order = {path: (is_quick(path), number) for number, path in enumerate(paths)}
 
     def place(item: pytest.Item) -> tuple[tuple[bool, int], bool]:
-        """The long files first: none is left over at the end. In a file, the tests that share processes last."""
-        shares = item.path.parent in REORDERED and not SHARED.isdisjoint(getattr(item, "fixturenames", ()))
+        """The long files first: none is left over at the end. In a file, the tests that share
+        processes last.
+        """
+        shares = item.path.parent in REORDERED and not SHARED.isdisjoint(
+            getattr(item, "fixturenames", ())
+        )
         return order[item.path], shares
 
     items.sort(key=place)
@@ -82,7 +106,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(autouse=True, scope="session")
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Generator[None, None, None]:
-    """Nothing is read from, or left in, the user's cache folder, and none of the user's own variables counts."""
+    """Nothing is read from, or left in, the user's cache folder, and none of the user's own
+    variables counts.
+    """
     with pytest.MonkeyPatch.context() as patch:
         for name in os.environ.keys() - {"HOLOZEN_LONG"}:
             if name.startswith("HOLOZEN_") or name == "ROS_DOMAIN_ID":
@@ -99,11 +125,15 @@ def trials() -> Callable[[int, int], int]:
 
 
 @pytest.fixture
-def call(capfd: pytest.CaptureFixture[str]) -> Generator[Callable[..., subprocess.CompletedProcess[str]], None, None]:
-    """`call("topic", "list")`: run `holozen topic list` in this process. For what verbs write, which needs no other.
-    An AssertionError ends one that goes on for PATIENCE.
+def call(
+    capfd: pytest.CaptureFixture[str],
+) -> Generator[Callable[..., subprocess.CompletedProcess[str]], None, None]:
+    """`call("topic", "list")`: run `holozen topic list` in this process. For what verbs write,
+    which needs no other. An AssertionError ends one that goes on for PATIENCE.
     """
-    handlers = {number: signal.getsignal(number) for number in (*SIGNALS, signal.SIGTSTP, signal.SIGALRM)}
+    handlers = {
+        number: signal.getsignal(number) for number in (*SIGNALS, signal.SIGTSTP, signal.SIGALRM)
+    }
 
     def late(_number: int, _frame: object) -> None:
         raise AssertionError(f"it still runs after {PATIENCE:g} s")
@@ -125,10 +155,26 @@ def call(capfd: pytest.CaptureFixture[str]) -> Generator[Callable[..., subproces
     for number, handler in handlers.items():
         signal.signal(number, handler)
     # What `run` and `launch` leave:
-    for known in (packages.given, packages.starts, packages.stand_ins):
-        known.clear()
+    if packages := sys.modules.get("holozen.ros.packages"):
+        for known in (packages.given, packages.starts, packages.stand_ins):
+            known.clear()
     if importer := sys.modules.get("holozen.ros.importer"):
         importer.remove()
+
+
+@pytest.fixture
+def run(
+    wire: Wire, call: Callable[..., subprocess.CompletedProcess[str]]
+) -> Callable[..., tuple[int, str, str]]:
+    """Run `holozen VERB WORDS...` on the test's wire, in this process: exit code, output,
+    errors.
+    """
+
+    def run(*words: object) -> tuple[int, str, str]:
+        done = call(*map(str, words), *wire.flags)
+        return done.returncode, done.stdout, done.stderr
+
+    return run
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -155,6 +201,8 @@ def _no_skip(report: Any) -> Any:
     if IN_CI and report.outcome == "skipped" and not hasattr(report, "wasxfail"):
         reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr
         if "not built: " in str(reason):  # takes long to build, which `scripts/test --long` does
+            return report
+        if "left out: " in str(reason):  # an extension
             return report
         report.outcome, report.longrepr = "failed", f"in CI nothing may be skipped: {reason}"
     return report

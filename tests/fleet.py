@@ -8,8 +8,8 @@ from typing import Any
 
 import zenoh
 
-from holozen import authority
 from holozen.bus import Bus
+from holozen.secure import authority
 from holozen.testing import Process
 from holozen.testing.wire import command, free_port
 from holozen.transport.connection import Connection
@@ -26,10 +26,14 @@ class Fleet:
         shutil.copytree(root / "Old", root.parent / "Old")  # a revoked member keeps a copy
         authority.revoke(root, "Old")
         self.endpoint = f"tls/127.0.0.1:{free_port()}"
-        self.router = self.start("router", "--listen", self.endpoint)
-        self.router.wait_for_line("listens at", 60)
+        self.start_router()
         self._sim = sim
         self.sim = self.start_sim()
+
+    def start_router(self) -> None:
+        """The router, or another one in its place."""
+        self.router = self.start("router", "--listen", self.endpoint)
+        self.router.wait_for_line("listens at", 60)
 
     def start_sim(self) -> Process:
         """A sim that listens, with the flags of this fleet."""
@@ -48,22 +52,35 @@ class Fleet:
         return self._ends.enter_context(process)
 
     def bus(self, name: str, **more: Any) -> Bus:
-        connection = Connection("client", connect=(self.endpoint,), secure=str(self.root / name), **more)
+        connection = Connection(
+            "client", connect=(self.endpoint,), secure=str(self.root / name), **more
+        )
         return self._ends.enter_context(Bus("test", connection))
 
     def tool(self, name: str, **more: object) -> zenoh.Session:
-        """A plain Zenoh session with the certificate of a member, or of `Old`, whom it was taken from. `more`: settings
-        of Zenoh, with two underscores for a slash. Raises zenoh.ZError.
+        """A plain Zenoh session with the certificate of a member, or of `Old`, whom it was taken
+        from. `more`: settings of Zenoh, with two underscores for a slash. Raises zenoh.ZError.
         """
-        tls, folder = "transport/link/tls", self.root.parent / name if name == "Old" else self.root / name
+        tls, folder = (
+            "transport/link/tls",
+            self.root.parent / name if name == "Old" else self.root / name,
+        )
         values: dict[str, object] = {
-            "mode": "client", "connect/endpoints": [self.endpoint], "connect/timeout_ms": 5000,
-            "connect/exit_on_failure": True, "listen/endpoints": [], "scouting/multicast/enabled": False,
-            f"{tls}/root_ca_certificate": f"{folder}/ca.pem", f"{tls}/connect_certificate": f"{folder}/cert.pem",
-            f"{tls}/connect_private_key": f"{folder}/key.pem", f"{tls}/enable_mtls": True,
-        }  # fmt: skip
+            "mode": "client",
+            "connect/endpoints": [self.endpoint],
+            "connect/timeout_ms": 5000,
+            "connect/exit_on_failure": True,
+            "listen/endpoints": [],
+            "scouting/multicast/enabled": False,
+            f"{tls}/root_ca_certificate": f"{folder}/ca.pem",
+            f"{tls}/connect_certificate": f"{folder}/cert.pem",
+            f"{tls}/connect_private_key": f"{folder}/key.pem",
+            f"{tls}/enable_mtls": True,
+        }
         config = zenoh.Config()
-        for path, value in (values | {name.replace("__", "/"): value for name, value in more.items()}).items():
+        for path, value in (
+            values | {name.replace("__", "/"): value for name, value in more.items()}
+        ).items():
             config.insert_json5(path, json.dumps(value))
         return zenoh.open(config)
 

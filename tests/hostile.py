@@ -32,18 +32,24 @@ def stl(count: int, triangles: bytes = b"") -> bytes:
 
 
 COLLADA = (
-    '<COLLADA><library_geometries><geometry id="g"><mesh><source id="s"><float_array count="99999999999">0'
-    '</float_array></source><triangles count="99999999999"><input semantic="VERTEX" source="#s" offset="9999999"/>'
+    '<COLLADA><library_geometries><geometry id="g"><mesh><source id="s"><float_array '
+    'count="99999999999">0'
+    '</float_array></source><triangles count="99999999999"><input semantic="VERTEX" source="#s" '
+    'offset="9999999"/>'
     "<p>0</p></triangles></mesh></geometry></library_geometries></COLLADA>"
 )
 HOSTILE = {
-    "entity bomb": f'<!DOCTYPE r [<!ENTITY e0 "x">{ENTITIES}]><robot name="&e11;"><link name="a"/></robot>',
-    "quadratic entity": f'<!DOCTYPE r [<!ENTITY a "{"x" * 100_000}">]><robot name="{"&a;" * 10_000}"/>',
+    "entity bomb": f'<!DOCTYPE r [<!ENTITY e0 "x">{ENTITIES}]><robot name="&e11;"><link '
+    'name="a"/></robot>',
+    "quadratic entity": f'<!DOCTYPE r [<!ENTITY a "{"x" * 100_000}">]><robot '
+    f'name="{"&a;" * 10_000}"/>',
     "external entity": '<!DOCTYPE r [<!ENTITY x SYSTEM "file://{secret}">]>' + link("&x;"),
     "external subset": '<!DOCTYPE robot SYSTEM "file://{secret}">' + link(""),
     "parameter entity": '<!DOCTYPE r [<!ENTITY % p SYSTEM "file://{secret}"> %p;]>' + link(""),
     "stylesheet": '<?xml-stylesheet href="file://{secret}"?>' + link(""),
-    "xinclude": link('<x:include xmlns:x="http://www.w3.org/2001/XInclude" href="{secret}" parse="text"/>'),
+    "xinclude": link(
+        '<x:include xmlns:x="http://www.w3.org/2001/XInclude" href="{secret}" parse="text"/>'
+    ),
     "other encoding": '<?xml version="1.0" encoding="utf-7"?>' + link(""),
     "many elements": link("<visual/>" * 400_000),
     "deep elements": link("<a>" * 100_000),
@@ -51,17 +57,27 @@ HOSTILE = {
     "long attribute": f'<robot name="{"n" * 3_900_000}"><link name="a"/></robot>',
     "long text": f"<robot name='r'>{'x' * 10_000_000}</robot>",
     "long number": link(f'<inertial><mass value="{"9" * 1_000_000}"/></inertial>'),
-    "many joints": "<robot name='r'><link name='l0'/>" + "".join(
-        f"<link name='l{n}'/><joint name='j{n}' type='fixed'><parent link='l{n - 1}'/><child link='l{n}'/></joint>"
-        for n in range(1, 12_000)) + "</robot>",
-    "cycle of joints": "<robot name='r'><link name='a'/><link name='b'/>" + "".join(
-        f"<joint name='{p}' type='fixed'><parent link='{p}'/><child link='{c}'/></joint>" for p, c in ("ab", "ba"))
-        + "</robot>",
-    "not finite": link('<inertial><mass value="nan"/><inertia ixx="inf" iyy="-1" izz="1e308"/></inertial>'),
+    "many joints": "<robot name='r'><link name='l0'/>"
+    + "".join(
+        f"<link name='l{n}'/><joint name='j{n}' type='fixed'><parent link='l{n - 1}'/><child "
+        f"link='l{n}'/></joint>"
+        for n in range(1, 12_000)
+    )
+    + "</robot>",
+    "cycle of joints": "<robot name='r'><link name='a'/><link name='b'/>"
+    + "".join(
+        f"<joint name='{p}' type='fixed'><parent link='{p}'/><child link='{c}'/></joint>"
+        for p, c in ("ab", "ba")
+    )
+    + "</robot>",
+    "not finite": link(
+        '<inertial><mass value="nan"/><inertia ixx="inf" iyy="-1" izz="1e308"/></inertial>'
+    ),
     "huge box": link('<collision><geometry><box size="1e308 1e308 1e308"/></geometry></collision>'),
     "model in itself": "<sdf version='1.6'><include><uri>model://bot</uri></include></sdf>",
     "include by path": "<sdf version='1.6'><include><uri>file://{secret}</uri></include></sdf>",
-    "include by the network": "<sdf version='1.6'><include><uri>https://127.0.0.1/m.sdf</uri></include></sdf>",
+    "include by the network": "<sdf "
+    "version='1.6'><include><uri>https://127.0.0.1/m.sdf</uri></include></sdf>",
     "deep models": "<sdf version='1.6'>" + "<model name='m'>" * 5_000,
     "mesh by file://": mesh("file://{secret}"),
     "mesh by path": mesh("{secret}"),
@@ -81,12 +97,16 @@ HOSTILE = {
     "STL of NaN": mesh(data("stl", stl(1, struct.pack("<12fH", *[float("nan")] * 12, 0)))),
     "STL that is huge": mesh(data("stl", stl(1, struct.pack("<12fH", *[3e38] * 12, 0)))),
     "texture by path": link(
-        '<visual><geometry><box size="1 1 1"/></geometry><material name="m"><texture filename="{secret}"/></material>'
-        "</visual>"),
+        '<visual><geometry><box size="1 1 1"/></geometry><material name="m"><texture '
+        'filename="{secret}"/></material>'
+        "</visual>"
+    ),
     "name of a path": '<robot name="../../etc"><link name="/etc/passwd"/></robot>',
-    "plugin of a path": link("").replace("</robot>", '<gazebo><plugin name="p" filename="{secret}"/></gazebo></robot>'),
+    "plugin of a path": link("").replace(
+        "</robot>", '<gazebo><plugin name="p" filename="{secret}"/></gazebo></robot>'
+    ),
     "base64 that is none": mesh("data:model/stl;base64,%%%%"),
-}  # fmt: skip
+}
 """What a text is -> the text."""
 
 MESHES = {
@@ -107,7 +127,9 @@ MESHES = {
 
 
 def laid_out(folder: Path) -> tuple[Path, Iterator[tuple[str, str]]]:
-    """A package with these meshes, links and a fifo, beside a private file; and the name and text of each robot."""
+    """A package with these meshes, links and a fifo, beside a private file; and the name and text
+    of each robot.
+    """
     package, secret = folder / "bot", folder / "secret.stl"
     secret.write_bytes(stl(2, struct.pack("<12fH", *range(12), 0) * 2))
     package.mkdir()

@@ -2,18 +2,22 @@
 
 python -m tests.pages NAME FOLDER
 
-- A code block with the title `FILE` is the file's content. `FILE, before TEXT` and `FILE, after TEXT` insert it before
-  or after the one line of the file that holds TEXT; `FILE, instead of TEXT` replaces that line.
-- A `console` block has commands after `$ `, each followed by what it prints; `...` stands for anything. Without a title
-  each runs to its end, with exit code 0 unless an `error:` is shown. With a title, of a terminal, it goes on until a
-  line `^C`, and the page goes on once it has printed what is shown.
-- `<!-- TERMINAL: hold KEY -->` holds a key there for a second; `<!-- TERMINAL: type KEYS -->` types.
-- A block without a language has a command a line. What goes on, such as a sim, ends with the block, as do variables;
-  `record` ends after a second.
-- A `python` block without a title is run to its end.
-- `<!-- given: COMMAND; COMMAND -->` is what the reader has running from there on, until the next such line, which may
-  say `nothing`.
-- `<!-- not run: REASON -->` stands before a block that cannot be run here, or that another test runs.
+- A code block with the title `FILE` is the file's content. `FILE, before TEXT` and `FILE, after
+  TEXT` insert it before or after the one line of the file that holds TEXT; `FILE, instead of TEXT`
+  replaces that line.
+- A `console` block has commands after `$ `, each followed by what it prints; `...` stands for
+  anything. Without a title each runs to its end, with exit code 0 unless an `error:` is shown. With
+  a title, of a terminal, it goes on until a line `^C`, and the page goes on once it has printed
+  what is shown.
+- `<!-- TERMINAL: hold KEY -->` holds a key there for a second; `<!-- TERMINAL: type KEYS -->`
+  types.
+- A block without a language has a command a line. What goes on, such as a sim, ends with the block,
+  as do variables; `record` ends after a second.
+- A `python` block without a title is run to its end. A `py` block quotes our code.
+- `<!-- given: COMMAND; COMMAND -->` is what the reader has running from there on, until the next
+  such line, which may say `nothing`.
+- `<!-- not run: REASON -->` stands before a block that cannot be run here, or that another test
+  runs.
 """
 
 import os
@@ -30,7 +34,7 @@ from typing import NamedTuple, Self
 from holozen.testing import Terminal, wait_for
 
 REPO = Path(__file__).parents[1]
-DOCS = REPO / "docs"
+PAGES = sorted([*REPO.glob("docs/**/*.md"), REPO / "examples" / "fleet" / "README.md"])
 STEP = re.compile(
     r'^```(?P<language>\w*)(?: title="(?P<title>[^"]+)")?\n(?P<text>.*?)^```$'
     r"|^<!-- given: (?P<given>[^\n]+) -->$|^<!-- not run: (?P<reason>[^\n]+) -->\n\n?(?=```)"
@@ -38,11 +42,13 @@ STEP = re.compile(
     re.M | re.S,
 )
 GOES_ON = re.compile(
-    r"(?:\S*/)?holozen (?:controller(?!.* --resume)|pose-service|record|router|ros2|run|teleop(?!.* --script)|up|view"
-    r"|sim(?! (?:pause|play|reset|step))|topic (?:echo|hz|pub)(?!.* --(?:once|times)))\b|zenoh .* subscribe|.* &$"
+    r"(?:\S*/)?holozen (?:controller(?!.* "
+    r"--resume)|pose-service|record|router|ros2|run|teleop(?!.* --script)|up|view"
+    r"|sim(?! (?:pause|play|reset|step))|topic (?:echo|hz|pub)(?!.* --(?:once|times)))\b|zenoh .* "
+    r"subscribe|.* &$"
 )
 EDIT = re.compile(r"(?P<file>[^,]+)(?:, (?P<how>before|after|instead of) (?P<where>.+))?")
-READ = {"text", "toml", "xml"}  # blocks that are only read
+READ = {"py", "text", "toml", "xml"}  # blocks that are only read
 WITHIN = 60.0  # s for a command
 MOMENT = 5.0  # s for the first line of one that goes on; it may have nothing to say
 MORE = 0.5  # s that it has to go on after that, since the line may be an error
@@ -63,7 +69,10 @@ def commands(block: str) -> Iterator[Command]:
 def same(shown: str, printed: str) -> bool:
     """Whether the lines shown are among the lines printed, in this order."""
     left = iter(plain(printed).replace("\r", "\n").splitlines())
-    return all(any(pattern(line).fullmatch(" ".join(one.split())) for one in left) for line in shown.splitlines())
+    return all(
+        any(pattern(line).fullmatch(" ".join(one.split())) for one in left)
+        for line in shown.splitlines()
+    )
 
 
 def pattern(line: str) -> re.Pattern[str]:
@@ -85,8 +94,10 @@ class Reader:
         for terminal in (*self.terminals.values(), *self.started, *self.given):
             terminal.close()
 
-    def follow(self, page: Path) -> int:
-        """Do each step; their number. AssertionError with the step that does not do what the page says."""
+    def follow(self, page: Path) -> int:  # noqa: C901 - a case for each kind of step
+        """Do each step; their number. AssertionError with the step that does not do what the page
+        says.
+        """
         found = list(STEP.finditer(page.read_text()))
         steps = iter(found)
         for step in steps:
@@ -97,6 +108,8 @@ class Reader:
                 self.begin(step["given"].removeprefix("nothing").split("; "), self.given)
             elif step["verb"]:
                 self.press(step["terminal"], step["verb"], step["keys"])
+            elif step["language"] == "py":
+                continue  # tests/architecture/test_tour.py
             elif not step["language"]:
                 variables = dict(os.environ)
                 self.begin(step["text"].splitlines(), self.started)
@@ -114,12 +127,16 @@ class Reader:
             elif step["language"] == "python":
                 self.run(Command(f"python -c {shlex.quote(step['text'])}", ""))
             else:
-                assert step["language"] in READ, f"a block of {step['language']} is neither run nor only read"
+                assert step["language"] in READ, (
+                    f"a block of {step['language']} is neither run nor only read"
+                )
         end(self.given)
         return len(found)
 
     def begin(self, lines: list[str], started: list[Terminal]) -> None:
-        """Run a command a line; those that go on are `started`, and have begun before one that ends is run."""
+        """Run a command a line; those that go on are `started`, and have begun before one that ends
+        is run.
+        """
         begun = list[tuple[Terminal, float]]()
         for text in [*lines, ""]:
             line = text.partition("  #")[0].strip()
@@ -150,22 +167,35 @@ class Reader:
         if edit["how"]:
             lines = file.read_text().splitlines(keepends=True)
             (at,) = (number for number, line in enumerate(lines) if edit["where"] in line)
-            first, last = {"before": (at, at), "after": (at + 1, at + 1), "instead of": (at, at + 1)}[edit["how"]]
+            first, last = {
+                "before": (at, at),
+                "after": (at + 1, at + 1),
+                "instead of": (at, at + 1),
+            }[edit["how"]]
             text = "".join(lines[:first]) + text + "".join(lines[last:])
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(text)
 
     def run(self, command: Command) -> None:
         if command.line.startswith("cd "):
-            self.folder = self.folder / command.line.removeprefix("cd ")
+            self.folder /= Path(command.line.removeprefix("cd ")).expanduser()
             return
         done = subprocess.run(
-            ["bash", "-c", command.line], cwd=self.folder, stdin=subprocess.DEVNULL, text=True,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=WITHIN,
-        )  # fmt: skip
+            ["bash", "-c", command.line],
+            cwd=self.folder,
+            stdin=subprocess.DEVNULL,
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            timeout=WITHIN,
+        )
         wrong = "error" in command.shown
-        assert (done.returncode != 0) == wrong, f"$ {command.line}\n{done.stdout}exit code {done.returncode}"
-        assert same(command.shown, done.stdout), f"$ {command.line}\n{done.stdout}\ninstead of\n{command.shown}"
+        assert (done.returncode != 0) == wrong, (
+            f"$ {command.line}\n{done.stdout}exit code {done.returncode}"
+        )
+        assert same(command.shown, done.stdout), (
+            f"$ {command.line}\n{done.stdout}\ninstead of\n{command.shown}"
+        )
 
     def attend(self, name: str, text: str) -> None:
         for line, shown in commands(text.replace("^C", "$ ^C")):
@@ -193,7 +223,9 @@ def end(terminals: list[Terminal]) -> None:
 
 
 def speaks(terminal: Terminal, until: float) -> bool:
-    """Whether a terminal shows anything, or has been waited for. AssertionError if its command ended."""
+    """Whether a terminal shows anything, or has been waited for. AssertionError if its command
+    ended.
+    """
     assert terminal.process.returncode is None, plain(terminal.raw)
     return bool(plain(terminal.raw).strip()) or time.monotonic() > until
 
@@ -213,9 +245,12 @@ def plain(text: str) -> str:
 
 def main(name: str, folder: Path) -> None:
     """Follow a page, at home in the folder, in a shell in which .venv is active."""
-    os.environ |= {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}", "HOME": str(folder)}
+    os.environ |= {
+        "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
+        "HOME": str(folder),
+    }
     with Reader(folder) as reader:
-        print(f"{reader.follow(DOCS / f'{name}.md')} steps")
+        print(f"{reader.follow(REPO / f'{name}.md')} steps")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,6 @@
-"""hb_bot as students keep and write it: a folder called anything, tags of ROS 1 and ROS 2, wheels anywhere."""
+"""hb_bot as students keep and write it: a folder called anything, tags of ROS 1 and ROS 2, wheels
+anywhere.
+"""
 
 import math
 from pathlib import Path
@@ -61,7 +63,7 @@ def wheel(name: str, place: tuple[float, float], axis: str, package: str) -> str
     <parent link="chassis"/><child link="{name}"/>
     <axis xyz="{axis}"/><limit effort="5" velocity ="5"/>
   </joint>
-  <gazebo reference="{name}"><material>Gazebo/Black</material></gazebo>"""
+  <gazebo reference="{name}"><material>Gazebo/Black</material></gazebo>"""  # noqa: E501
 
 
 def hb_bot(
@@ -76,7 +78,9 @@ def hb_bot(
     """The lesson's robot, its wheels turned by `turn` (rad) about the middle."""
     cosine, sine = math.cos(turn), math.sin(turn)
     places = [(round(cosine * x - sine * y, 6), round(sine * x + cosine * y, 6)) for x, y in PLACES]
-    wheels = "".join(wheel(name, place, axis, package) for name, place in zip(names, places, strict=True))
+    wheels = "".join(
+        wheel(name, place, axis, package) for name, place in zip(names, places, strict=True)
+    )
     return f"""<?xml version="1.0"?>
 <robot name ="hb_bot" xmlns:xacro="http://www.ros.org/wiki/xacro">
   <!-- chasis -->
@@ -96,7 +100,9 @@ def hb_bot(
 """
 
 
-def workspace(home: Path, folder: str, text: str, package_xml: str | None = None, ends: str = "\n") -> Path:
+def workspace(
+    home: Path, folder: str, text: str, package_xml: str | None = None, ends: str = "\n"
+) -> Path:
     """A package's folder with the lesson's meshes and the robot's file, whose path is returned."""
     root = home / folder
     (root / "urdf").mkdir(parents=True)

@@ -1,7 +1,8 @@
-"""Feetech's serial bus servos (STS3215) as wheels: commanded speeds out, measured speeds in. Linux, without a library.
+"""Feetech's serial bus servos (STS3215) as wheels: commanded speeds out, measured speeds in. Linux,
+without a library.
 
-Packets and addresses are those of Feetech's protocol manual for the SMS and STS series. A speed is in steps per second,
-with its sign in bit 15; a turn is 4096 steps.
+Packets and addresses are those of Feetech's protocol manual for the SMS and STS series. A speed is
+in steps per second, with its sign in bit 15; a turn is 4096 steps.
 """
 
 import math
@@ -27,7 +28,9 @@ class ServoError(Exception):
 
 
 def packet(servo: int, instruction: int, parameters: bytes = b"") -> bytes:
-    """The bytes of an instruction, or of an answer, which has its error code in place of the instruction."""
+    """The bytes of an instruction, or of an answer, which has its error code in place of the
+    instruction.
+    """
     body = bytes((servo, len(parameters) + 2, instruction)) + parameters
     return b"\xff\xff" + body + bytes((~sum(body) & 0xFF,))
 
@@ -89,7 +92,9 @@ class Servos:
         for _ in range(TRIES):
             if (answer := self._try(servo, instruction, parameters)) is not None:
                 return answer
-        raise ServoError(f"servo {servo} at {self._port} does not answer: is it powered, and is that its id?")
+        raise ServoError(
+            f"servo {servo} at {self._port} does not answer: is it powered, and is that its id?"
+        )
 
     def _try(self, servo: int, instruction: int, parameters: bytes) -> bytes | None:
         """As `_ask`, once: None without an answer in time."""
@@ -104,7 +109,9 @@ class Servos:
                 if len(answer) < 6 or answer != packet(servo, answer[4], answer[5:-1]):
                     raise ServoError(f"servo {servo} at {self._port}: its answer is garbled")
                 if answer[4]:
-                    raise ServoError(f"servo {servo} at {self._port} reports error {answer[4]:#04x}")
+                    raise ServoError(
+                        f"servo {servo} at {self._port} reports error {answer[4]:#04x}"
+                    )
                 return answer[5:-1]
             if not select.select([self._file], [], [], max(0.0, deadline - time.monotonic()))[0]:
                 return None

@@ -1,5 +1,5 @@
-"""Three simulated STS3215 servos: prints their port, then their speeds in steps/s whenever these change. Run it by
-`python examples/lekiwi/simulated_servos.py`.
+"""Three simulated STS3215 servos: prints their port, then their speeds in steps/s whenever these
+change. Run it by `python examples/lekiwi/simulated_servos.py`.
 """
 
 import os
@@ -42,7 +42,8 @@ class Simulated:
     def speeds(self) -> str:
         """The speeds of all servos, in steps/s."""
         steps = {
-            servo: round(rate_of(bytes(each[SPEED : SPEED + 2])) * STEPS) for servo, each in self.registers.items()
+            servo: round(rate_of(bytes(each[SPEED : SPEED + 2])) * STEPS)
+            for servo, each in self.registers.items()
         }
         return " ".join(f"{servo}:{speed}" for servo, speed in steps.items())
 

@@ -1,4 +1,6 @@
-"""`holozen completion`: a shell script, which calls `holozen __complete WORD...` for the candidates."""
+"""`holozen completion`: a shell script, which calls `holozen __complete WORD...` for the
+candidates.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +10,15 @@ import io
 import json
 import re
 from collections.abc import Callable, Iterable
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from holozen.bus import Bus
 from holozen.cli.hints import is_any
 from holozen.cli.verb import Noun, Service, Verb, argument, by_name
-from holozen.flags import Parser, package
+from holozen.flags import Parser
 from holozen.transport import connection
 from holozen.transport.actions import found_in
 from holozen.transport.graph import Endpoint
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 BASH = """\
 _holozen() {
@@ -40,26 +38,37 @@ compdef _holozen holozen
 """
 FISH = """\
 complete -c holozen -a '(holozen __complete (commandline -opc)[2..-1] (commandline -ct) 2>/dev/null)'
-"""
+"""  # noqa: E501
 SCRIPTS = {"bash": BASH, "zsh": ZSH, "fish": FISH}
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the script of a shell."""
     script = SCRIPTS[args.shell]
-    print(json.dumps({"shell": args.shell, "script": script}) + "\n" if args.json else script, end="")
+    print(
+        json.dumps({"shell": args.shell, "script": script}) + "\n" if args.json else script, end=""
+    )
     return 0
 
 
 PATIENCE = 0.25  # s to find nodes
-SAFE = re.compile(r"[A-Za-z0-9_./@%+-]+")  # words that need no quoting in a shell; keys come over the wire
+# words that need no quoting in a shell; keys come over the wire
+SAFE = re.compile(r"[A-Za-z0-9_./@%+-]+")
 PARAMETERS = "rcl_interfaces/srv/ListParameters"
 LIVE = {
-    "key": "keys", "keys": "keys", "robot": "robots", "robots": "robots", "delete names": "robots",
-    "topic type": "types", "topic words": "types", "action key": "actions",
-    "service key": "services", "service type": "services' types",
-    "node name": "nodes", "param node": "nodes with parameters",
-}  # fmt: skip
+    "key": "keys",
+    "keys": "keys",
+    "robot": "robots",
+    "robots": "robots",
+    "delete names": "robots",
+    "topic type": "types",
+    "topic words": "types",
+    "action key": "actions",
+    "service key": "services",
+    "service type": "services' types",
+    "node name": "nodes",
+    "param node": "nodes with parameters",
+}
 """Argument, or verb and argument -> the kind of candidates that are looked up on the wire."""
 
 
@@ -78,31 +87,38 @@ def _candidates(words: list[str], verbs: Iterable[str], command: Callable[[str],
     *before, current = words
     if not before:
         return [verb for verb in verbs if verb.startswith(current)]
-    parser, left = _parser(command(before[0]), before[1:])
+    one, left = _verb(command(before[0]), before[1:])
+    parser = one.parser()
     action = _wanted(parser, left)
-    if isinstance(noun := command(before[0]), Service) and not before[1:] and not current.startswith("-"):
-        found = list(noun.modules)
+    if isinstance(one, Service) and not left and not current.startswith("-"):
+        found = list(one.modules)
     elif current.startswith("-"):
         flags = parser._option_string_actions.items()
-        found = [flag for flag, action in flags if flag.startswith("--") and action.help != argparse.SUPPRESS]
+        found = [
+            flag
+            for flag, action in flags
+            if flag.startswith("--") and action.help != argparse.SUPPRESS
+        ]
     elif action is None:
         return []
     elif action.choices is not None:
         found = [str(choice) for choice in action.choices]
-    elif look := LOOKED_UP.get(f"{before[0]} {action.dest}"):
-        found = look(left, current)
+    elif isinstance(one, Verb) and (listed := one.candidates.get(action.dest)):
+        found = listed(left, current)
     else:
         kind = LIVE.get(f"{before[0]} {action.dest}") or LIVE.get(action.dest)
         slash = "/" * current.startswith("/")  # as ROS writes keys
-        found = [slash + word for word in _live(kind, before) if SAFE.fullmatch(word)] if kind else []
+        found = (
+            [slash + word for word in _live(kind, before) if SAFE.fullmatch(word)] if kind else []
+        )
     return [word for word in found if word.startswith(current)]
 
 
-def _parser(command: Any, words: list[str]) -> tuple[argparse.ArgumentParser, list[str]]:
-    """The parser of a command, or of the noun's verb that `words` begin with; and the remaining words."""
+def _verb(command: Any, words: list[str]) -> tuple[Any, list[str]]:
+    """A command, or the noun's verb that `words` begin with; and the remaining words."""
     if isinstance(command, Noun) and words and words[0] in command.modules:
-        return command.verb(words[0]).parser(), words[1:]
-    return command.parser(), words
+        return command.verb(words[0]), words[1:]
+    return command, words
 
 
 def _wanted(parser: argparse.ArgumentParser, words: list[str]) -> argparse.Action | None:
@@ -124,38 +140,6 @@ def _wanted(parser: argparse.ArgumentParser, words: list[str]) -> argparse.Actio
     return places[taken] if places else None
 
 
-def _types(left: list[str], _current: str) -> list[str]:
-    from holozen.messages.registry import Registry
-
-    return Registry(_given(left)).names()
-
-
-def _packages(left: list[str], current: str) -> list[str]:
-    """The names of packages; none for an empty word, so that the shell lists files."""
-    from holozen.ros import packages
-
-    packages.use(_given(left))
-    return sorted(packages.around()) if current else []
-
-
-def _executables(left: list[str], _current: str) -> list[str]:
-    """The executables of the package named before."""
-    from holozen.ros import executables, packages
-
-    packages.use(_given(left))
-    return executables.names(left[-1])
-
-
-def _given(left: list[str]) -> dict[str, Path]:
-    return dict(package(value) for flag, value in pairwise(left) if flag == "--package")
-
-
-LOOKED_UP: dict[str, Callable[[list[str], str], list[str]]] = {
-    "interface type": _types, "run target": _packages, "run words": _executables,
-}  # fmt: skip
-"""Verb and argument -> the function that lists candidates without the wire, from the words before and the current."""
-
-
 def _live(kind: str, words: list[str]) -> list[str]:
     flags = Parser(add_help=False)
     connection.add_arguments(flags)
@@ -175,15 +159,24 @@ def _words(kind: str, ends: list[Endpoint]) -> list[str]:
         "services": [end.key for end in services],
         "services' types": [end.type for end in services],
         "nodes": [end.node for end in ends],
-        "nodes with parameters": [end.key.rpartition("/")[0] for end in services if end.type == PARAMETERS],
+        "nodes with parameters": [
+            end.key.rpartition("/")[0] for end in services if end.type == PARAMETERS
+        ],
         "robots": [end.key.rpartition("/")[0] for end in topics if end.key.endswith("/odom")],
     }[kind]
     return [word for word in found if word and "*" not in word]
 
 
 VERBS = by_name(
-    Verb("completion", "print a script that completes verbs, flags, and the keys, types, services, nodes and robots"
-        " found", "bash > ~/.local/share/bash-completion/completions/holozen",
-        argument("shell", choices=SCRIPTS, help="for which shell"), run,
-        "print the script as JSON, one object per line", bus=False),
-)  # fmt: skip
+    Verb(
+        "completion",
+        "print a script that completes verbs, flags, and the keys, types, "
+        "services, nodes and robots"
+        " found",
+        "bash > ~/.local/share/bash-completion/completions/holozen",
+        argument("shell", choices=SCRIPTS, help="for which shell"),
+        run,
+        "print the script as JSON, one object per line",
+        bus=False,
+    ),
+)

@@ -11,8 +11,8 @@ from functools import partial
 from typing import Any
 
 from holozen.cli.hints import is_any, suggest_key
-from holozen.cli.output import Hex, Reader, csv_row, cut, lines, strict
 from holozen.console import Failure, printable, report
+from holozen.output import Hex, SampleReader, csv_row, cut, lines, strict
 from holozen.transport.errors import BusError
 from holozen.transport.graph import is_latched, latched, on_key
 from holozen.transport.node import Node
@@ -20,8 +20,12 @@ from holozen.transport.samples import RawSubscriber, Sample
 
 DEPTH = 1024  # messages that wait to be printed
 EXCLUSIVE = (
-    ("json", "csv"), ("json", "raw"), ("csv", "raw"), ("field", "raw"), ("full_length", "truncate_length"),
-)  # fmt: skip
+    ("json", "csv"),
+    ("json", "raw"),
+    ("csv", "raw"),
+    ("field", "raw"),
+    ("full_length", "truncate_length"),
+)
 """Flags of which one has no effect beside the other."""
 WAITING = 1.0  # s without a message until that is reported
 
@@ -32,7 +36,10 @@ def echo(args: argparse.Namespace, bus: Node) -> int:
         if getattr(args, one) and getattr(args, other):
             args.error(f"give --{one} or --{other}, not both".replace("_", "-"))
     try:
-        printer, reader = Printer(args), Reader(args.type_flag or args.type or "", args.package)
+        printer, reader = (
+            Printer(args),
+            SampleReader(args.type_flag or args.type or "", args.package),
+        )
     except ValueError as error:
         args.error(str(error))
     subscriber = bus.subscribe_raw(args.key, DEPTH)
@@ -41,7 +48,9 @@ def echo(args: argparse.Namespace, bus: Node) -> int:
 
 
 def _latched(args: argparse.Namespace, bus: Node, subscriber: RawSubscriber) -> deque[Sample]:
-    """The last messages of latched keys, as the QoS says, and after them those that arrived meanwhile."""
+    """The last messages of latched keys, as the QoS says, and after them those that arrived
+    meanwhile.
+    """
     every = args.qos_durability == "transient_local"
     last = args.key.rpartition("/")[2]
     if args.qos_durability == "volatile" or not (every or "*" in last or is_latched(last)):
@@ -52,10 +61,18 @@ def _latched(args: argparse.Namespace, bus: Node, subscriber: RawSubscriber) -> 
     return deque([sample for sample in kept if (sample.key, sample.payload) not in known] + came)
 
 
-def _echo(args: argparse.Namespace, bus: Node, subscriber: RawSubscriber, printer: Printer, reader: Reader) -> int:
+def _echo(
+    args: argparse.Namespace,
+    bus: Node,
+    subscriber: RawSubscriber,
+    printer: Printer,
+    reader: SampleReader,
+) -> int:
     first, seen = _latched(args, bus, subscriber), set[str]()
     nothing = "no message that passes the filter" if args.filter else "no messages"
-    then = subscriber.close if args.timeout else partial(_report_waiting, args, bus, nothing, printer)
+    then = (
+        subscriber.close if args.timeout else partial(_report_waiting, args, bus, nothing, printer)
+    )
     late = threading.Timer(args.timeout or WAITING, then)
     late.daemon = True
     late.start()
@@ -83,15 +100,20 @@ def _echo(args: argparse.Namespace, bus: Node, subscriber: RawSubscriber, printe
 
 def _check_type(given: str, key: str, bus: Node) -> None:
     """Raise Failure if all publishers of a key announce another type than the given one."""
-    found = {end.type for end in on_key(bus.endpoints(), key, "pub") if end.type and not is_any(end)}
+    found = {
+        end.type for end in on_key(bus.endpoints(), key, "pub") if end.type and not is_any(end)
+    }
     if found and given not in found:
-        raise Failure(f"{key}: its type is {' or '.join(sorted(found))}, not {given}; leave the type out")
+        raise Failure(
+            f"{key}: its type is {' or '.join(sorted(found))}, not {given}; leave the type out"
+        )
 
 
 def _report_waiting(args: argparse.Namespace, bus: Node, nothing: str, printer: Printer) -> None:
     try:
         report(f"waiting for {args.key}; {nothing} yet{_hint(args, bus, printer)}")
-    except Exception:  # the session was closed in the meantime, for which zenoh raises an error of its own
+    # the session was closed in the meantime, for which zenoh raises an error of its own
+    except Exception:
         return
 
 
@@ -102,7 +124,9 @@ def _hint(args: argparse.Namespace, bus: Node, printer: Printer) -> str:
 
 
 class Printer:
-    """Prints values as the flags say, and counts those it cannot show. Raises ValueError for an invalid flag."""
+    """Prints values as the flags say, and counts those it cannot show. Raises ValueError for an
+    invalid flag.
+    """
 
     def __init__(self, args: argparse.Namespace) -> None:
         self._args, self._many = args, "*" in args.key
@@ -110,7 +134,7 @@ class Printer:
         self._path = self.filter = None
         self.stopped: Any = None  # the last message that the filter rejected
         if args.field or args.filter:
-            from holozen.cli import fields
+            from holozen import fields
 
             self._pick = fields.pick
             self._path = fields.path(args.field) if args.field else None
@@ -118,7 +142,9 @@ class Printer:
         self._short = args.truncate_length or args.no_arr or args.no_str
 
     def show(self, sample: Sample, value: Any) -> bool:
-        """Print a value; returns whether it was shown. Raises LookupError if the field is missing."""
+        """Print a value; returns whether it was shown. Raises LookupError if the field is
+        missing.
+        """
         if sample.is_deletion:  # it holds no message, so no filter passes it and it has no field
             if not (self.filter or self._path):
                 self._write(sample, {"deleted": True} if self._args.json else "(deleted)")
@@ -137,7 +163,9 @@ class Printer:
                 self._fieldless += 1
                 return False
         if self._short:
-            value = cut(value, self._args.truncate_length, not self._args.no_arr, not self._args.no_str)
+            value = cut(
+                value, self._args.truncate_length, not self._args.no_arr, not self._args.no_str
+            )
         self._write(sample, value)
         return True
 
@@ -150,7 +178,9 @@ class Printer:
             text = csv_row([sample.key, value] if self._many else value)
         else:
             head = [printable(f"# {sample.key}")] if self._many else []
-            text = "\n".join([*head, *lines(value, longest=0 if self._args.full_length else None), "---"])
+            text = "\n".join(
+                [*head, *lines(value, longest=0 if self._args.full_length else None), "---"]
+            )
         print(text, flush=True)
         return None
 
@@ -158,7 +188,11 @@ class Printer:
         """One JSON object: the message, or anything that is not one under `value` or `hex`."""
         # An object received as one line of JSON is printed unchanged.
         whole = not (self._many or self._path or self._short) and isinstance(value, dict)
-        text = sample.payload.decode() if whole and sample.payload.startswith(b"{") and sample.payload.isascii() else ""
+        text = (
+            sample.payload.decode()
+            if whole and sample.payload.startswith(b"{") and sample.payload.isascii()
+            else ""
+        )
         if text and text.isprintable() and "NaN" not in text and "Infinity" not in text:
             return text
         if isinstance(value, Hex):

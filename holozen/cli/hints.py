@@ -15,7 +15,9 @@ def no_nodes(where: str) -> str:
 
 
 def none_found(what: str, ends: list[Endpoint], where: str) -> str:
-    """The message that the nodes at `where`, whose endpoints are `ends`, have no `what`; or that there are no nodes."""
+    """The message that the nodes at `where`, whose endpoints are `ends`, have no `what`; or that
+    there are no nodes.
+    """
     return f"no {what}: {f'the nodes at {where} have none' if ends else no_nodes(where)}"
 
 
@@ -27,8 +29,8 @@ def unknown(word: str, known: list[str], where: str) -> str:
 
 
 def suggest_key(bus: Node, keys: Iterable[str], kinds: tuple[str, ...] = ("pub", "sub")) -> str:
-    """` (did you mean 'odom'?)`, with the key nearest to the first of `keys` that no node has; or `; no nodes found at
-    ...`; or an empty string.
+    """` (did you mean 'odom'?)`, with the key nearest to the first of `keys` that no node has; or
+    `; no nodes found at ...`; or an empty string.
     """
     ends = [end for end in bus.endpoints() if end.session != bus.id]
     if not ends and not bus.connected():
@@ -45,10 +47,16 @@ def _suggest(lost: str, known: Collection[str]) -> str:
 
 
 def _near(lost: str, live: Collection[str]) -> list[str]:
-    """The keys that may be meant by one that no node has: none of another robot than the one that it names."""
+    """The keys that may be meant by one that no node has: none of another robot than the one that
+    it names.
+    """
     robot = lost.rpartition("/")[0]
     own = [key for key in live if robot and key.startswith(f"{robot}/")]
-    return own or [key for key in live if not robot or "/" not in key or closest(robot, [key.rpartition("/")[0]])]
+    return own or [
+        key
+        for key in live
+        if not robot or "/" not in key or closest(robot, [key.rpartition("/")[0]])
+    ]
 
 
 def is_any(end: Endpoint) -> bool:

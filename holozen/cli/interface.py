@@ -7,7 +7,7 @@ from typing import Any
 
 from holozen.cli.verb import Noun, Verb, by_name, open_bus
 from holozen.console import printable
-from holozen.flags import add_packages
+from holozen.flags import add_packages, packages_in
 from holozen.messages.definitions import Interface, InterfaceError, prototype
 from holozen.messages.registry import Registry
 
@@ -15,13 +15,18 @@ from holozen.messages.registry import Registry
 def list_types(args: argparse.Namespace) -> int:
     """Print the name of each type."""
     names = Registry(dict(args.package)).names()
-    kinds = [("msg", "Messages", args.only_msgs), ("srv", "Services", args.only_srvs),
-             ("action", "Actions", args.only_actions)]  # fmt: skip
+    kinds = [
+        ("msg", "Messages", args.only_msgs),
+        ("srv", "Services", args.only_srvs),
+        ("action", "Actions", args.only_actions),
+    ]
     all_kinds = not any(wanted for _, _, wanted in kinds)
     for kind, title, wanted in kinds:
         found = [name for name in names if f"/{kind}/" in name] if wanted or all_kinds else []
         if args.json:
-            print("".join(json.dumps({"name": name, "kind": kind}) + "\n" for name in found), end="")
+            print(
+                "".join(json.dumps({"name": name, "kind": kind}) + "\n" for name in found), end=""
+            )
         elif found:
             print("\n    ".join([f"{title}:", *found]))
     return 0
@@ -30,12 +35,18 @@ def list_types(args: argparse.Namespace) -> int:
 def show(args: argparse.Namespace) -> int:
     """Print the definition of a type, with nested fields indented."""
     interface = _found(args)
-    print(json.dumps(described(interface)) if args.json else "\n".join(map(printable_line, definition(interface))))
+    print(
+        json.dumps(described(interface))
+        if args.json
+        else "\n".join(map(printable_line, definition(interface)))
+    )
     return 0
 
 
 def _found(args: argparse.Namespace) -> Interface:
-    """The type that is named, or that of the named key; one that is unknown here is learned from its publisher."""
+    """The type that is named, or that of the named key; one that is unknown here is learned from
+    its publisher.
+    """
     registry = Registry(dict(args.package))
     try:
         return registry.find(args.type)
@@ -55,7 +66,9 @@ def _found(args: argparse.Namespace) -> Interface:
 
 
 def proto(args: argparse.Namespace) -> int:
-    """Print a message, the request of a service or the goal of an action, with all fields at their defaults."""
+    """Print a message, the request of a service or the goal of an action, with all fields at their
+    defaults.
+    """
     interface = Registry(dict(args.package)).find(args.type)
     value = prototype(interface.parts[0] if interface.parts else interface)
     print(json.dumps(value) if args.json else "\n".join(yaml(value)) or "{}")
@@ -89,15 +102,30 @@ def described(interface: Interface) -> dict[str, Any]:
     """A type as plain values."""
     row: dict[str, Any] = {"name": interface.name, "kind": interface.kind}
     if interface.parts:
-        names = ("request", "response") if interface.kind == "srv" else ("goal", "result", "feedback")
-        return row | {name: described(part) for name, part in zip(names, sections(interface), strict=True)}
-    fields = [field._asdict() | {"nested": field.nested and described(field.nested)} for field in interface.fields]
-    return row | {"fields": fields, "constants": [constant._asdict() for constant in interface.constants]}
+        names = (
+            ("request", "response") if interface.kind == "srv" else ("goal", "result", "feedback")
+        )
+        return row | {
+            name: described(part) for name, part in zip(names, sections(interface), strict=True)
+        }
+    fields = [
+        field._asdict() | {"nested": field.nested and described(field.nested)}
+        for field in interface.fields
+    ]
+    return row | {
+        "fields": fields,
+        "constants": [constant._asdict() for constant in interface.constants],
+    }
+
+
+# names that YAML reads as another type
+NOT_TEXT = ("yes", "no", "on", "off", "true", "false", "null")
 
 
 def yaml(value: dict[str, Any], indent: str = "") -> Iterator[str]:
     """The lines of a message in YAML. Lists are on one line, as in JSON."""
-    for name, inner in value.items():
+    for field, inner in value.items():
+        name = json.dumps(field) if field in NOT_TEXT else field
         if isinstance(inner, dict) and inner:
             yield f"{indent}{name}:"
             yield from yaml(inner, indent + "  ")
@@ -122,12 +150,36 @@ def _proto_arguments(parser: argparse.ArgumentParser) -> None:
     add_packages(parser)
 
 
+def _types(before: list[str], _current: str) -> list[str]:
+    return Registry(packages_in(before)).names()
+
+
 SUCH = "such as geometry_msgs/msg/Twist, std_srvs/srv/Trigger, nav2_msgs/action/NavigateToPose"
 VERBS = by_name(
     Noun("interface", "show message, service and action types"),
-    Verb("interface list", "list all known types", "--only-srvs", _list_arguments, list_types, bus=False),
-    Verb("interface show", "show the fields of a type, nested ones included", "geometry_msgs/msg/Twist",
-        _show_arguments, show),
-    Verb("interface proto", "print a message with all fields, to edit and publish",
-        "geometry_msgs/msg/Twist | holozen topic pub cmd_vel -", _proto_arguments, proto, bus=False),
-)  # fmt: skip
+    Verb(
+        "interface list",
+        "list all known types",
+        "--only-srvs",
+        _list_arguments,
+        list_types,
+        bus=False,
+    ),
+    Verb(
+        "interface show",
+        "show the fields of a type, nested ones included",
+        "geometry_msgs/msg/Twist",
+        _show_arguments,
+        show,
+        candidates={"type": _types},
+    ),
+    Verb(
+        "interface proto",
+        "print a message with all fields, to edit and publish",
+        "geometry_msgs/msg/Twist | holozen topic pub cmd_vel -",
+        _proto_arguments,
+        proto,
+        bus=False,
+        candidates={"type": _types},
+    ),
+)

@@ -1,4 +1,6 @@
-"""The verbs `list`, `type`, `find` and `info` of topics and services, and what those of actions share with them."""
+"""The verbs `list`, `type`, `find` and `info` of topics and services, and what those of actions
+share with them.
+"""
 
 from __future__ import annotations
 
@@ -9,15 +11,16 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from holozen.cli.hints import none_found, unknown
-from holozen.cli.output import decode
 from holozen.cli.topic import LISTEN
 from holozen.console import Failure, printable, report
+from holozen.output import decode
 from holozen.suggest import listed, suggest
 from holozen.transport.connection import FORBIDDEN
 from holozen.transport.errors import BusError
 from holozen.transport.graph import Endpoint, on_key
 from holozen.transport.node import Node
 from holozen.transport.samples import Replies, Sample
+from holozen.wire import SENDERS
 
 LOOK = 0.002  # s between two polls
 
@@ -47,8 +50,12 @@ def by_key(endpoints: list[Endpoint], *kinds: str) -> dict[str, list[Endpoint]]:
 
 
 def topics(endpoints: list[Endpoint]) -> list[Topic]:
-    """The keys that nodes read or write, sorted; without key expressions and keys that only tools such as echo read."""
-    found = [Topic(key, ends) for key, ends in by_key(endpoints, "pub", "sub").items() if "*" not in key]
+    """The keys that nodes read or write, sorted; without key expressions and keys that only tools
+    such as echo read.
+    """
+    found = [
+        Topic(key, ends) for key, ends in by_key(endpoints, "pub", "sub").items() if "*" not in key
+    ]
     return [topic for topic in found if topic.types or topic.publishers]
 
 
@@ -61,9 +68,15 @@ def print_rows(args: argparse.Namespace, rows: list[tuple[dict[str, Any], str]])
 
 
 def print_list(
-    args: argparse.Namespace, noun: str, rows: Iterable[tuple[str, str]], ends: list[Endpoint], where: str
+    args: argparse.Namespace,
+    noun: str,
+    rows: Iterable[tuple[str, str]],
+    ends: list[Endpoint],
+    where: str,
 ) -> int:
-    """Print each (key, type) once, or with -c only their number; `ends` are all endpoints at `where`."""
+    """Print each (key, type) once, or with -c only their number; `ends` are all endpoints at
+    `where`.
+    """
     found = sorted(set(rows))
     shown = "{} [{}]" if args.show_types else "{}"
     print_rows(args, [({"key": key, "type": kind}, shown.format(key, kind)) for key, kind in found])
@@ -72,8 +85,12 @@ def print_list(
     return 0
 
 
-def print_types(args: argparse.Namespace, types: Iterable[str], known: Iterable[str], where: str) -> int:
-    """Print the types of a key. Raises Failure if there are none. `known` are the keys at `where`."""
+def print_types(
+    args: argparse.Namespace, types: Iterable[str], known: Iterable[str], where: str
+) -> int:
+    """Print the types of a key. Raises Failure if there are none. `known` are the keys at
+    `where`.
+    """
     if not (types := sorted(types)):
         raise Failure(unknown(args.key, sorted(known), where))
     print_rows(args, [({"key": args.key, "type": name}, name) for name in types])
@@ -82,7 +99,11 @@ def print_types(args: argparse.Namespace, types: Iterable[str], known: Iterable[
 
 def print_keys_of(args: argparse.Namespace, types: Mapping[str, Iterable[str]]) -> int:
     """Print the keys of a type. Raises Failure if there are none. `types`: key -> its types."""
-    keys = sorted(key for key, its in types.items() if any(f"/{name}".endswith(f"/{args.type}") for name in its))
+    keys = sorted(
+        key
+        for key, its in types.items()
+        if any(f"/{name}".endswith(f"/{args.type}") for name in its)
+    )
     print_rows(args, [({"key": key, "type": args.type}, key) for key in keys])
     if not keys:
         known = sorted({name for its in types.values() for name in its})
@@ -91,11 +112,18 @@ def print_keys_of(args: argparse.Namespace, types: Mapping[str, Iterable[str]]) 
     return 0
 
 
-def print_sides(args: argparse.Namespace, types: Iterable[str], sides: Mapping[str, tuple[str, list[Any]]]) -> int:
-    """Print the types of a key and its nodes. `sides`: name in JSON -> title, and ends with a node and a session."""
+def print_sides(
+    args: argparse.Namespace, types: Iterable[str], sides: Mapping[str, tuple[str, list[Any]]]
+) -> int:
+    """Print the types of a key and its nodes. `sides`: name in JSON -> title, and ends with a node
+    and a session.
+    """
     types = sorted(set(types))
     if args.json:
-        rows = {name: [{"node": one.node, "session": one.session} for one in ones] for name, (_, ones) in sides.items()}
+        rows = {
+            name: [{"node": one.node, "session": one.session} for one in ones]
+            for name, (_, ones) in sides.items()
+        }
         print(json.dumps({"key": args.key, "types": types} | rows))
         return 0
     print(printable(f"Type: {', '.join(types)}"))
@@ -117,7 +145,11 @@ def is_hidden(key: str) -> bool:
 def list_services(args: argparse.Namespace, bus: Node) -> int:
     """Print each service key once."""
     ends = bus.endpoints()
-    rows = ((end.key, end.type) for end in ends if end.kind == "srv" and (args.hidden or not is_hidden(end.key)))
+    rows = (
+        (end.key, end.type)
+        for end in ends
+        if end.kind == "srv" and (args.hidden or not is_hidden(end.key))
+    )
     return print_list(args, "service", rows, ends, bus.where)
 
 
@@ -138,7 +170,9 @@ def service_info(args: argparse.Namespace, bus: Node) -> int:
     served = by_key(bus.endpoints(), "srv")
     if not (servers := served.get(args.key)):
         raise Failure(unknown(args.key, sorted(served), bus.where))
-    return print_sides(args, [end.type for end in servers], {"servers": ("Services count", servers)})
+    return print_sides(
+        args, [end.type for end in servers], {"servers": ("Services count", servers)}
+    )
 
 
 # Topics.
@@ -161,16 +195,23 @@ def list_topics(args: argparse.Namespace, bus: Node) -> int:
     if args.verbose and not (args.count or args.json):
         _print_verbose(found)
     else:
-        print_rows(args, [(vars(topic), topic.typed if args.show_types else topic.key) for topic in found])
+        print_rows(
+            args, [(vars(topic), topic.typed if args.show_types else topic.key) for topic in found]
+        )
     if not found:
         report(none_found("topics", ends, bus.where) + hint)
     return 0
 
 
 def _print_verbose(found: list[Topic]) -> None:
-    published = [(topic, topic.publishers) for topic in found if topic.publishers or not topic.subscriptions]
+    published = [
+        (topic, topic.publishers) for topic in found if topic.publishers or not topic.subscriptions
+    ]
     subscribed = [(topic, topic.subscriptions) for topic in found if topic.subscriptions]
-    for title, counted, rows in (("Published", "publisher", published), ("\nSubscribed", "subscriber", subscribed)):
+    for title, counted, rows in (
+        ("Published", "publisher", published),
+        ("\nSubscribed", "subscriber", subscribed),
+    ):
         print(f"{title} topics:")
         for topic, number in rows:
             print(printable(f" * {topic.typed} {number} {counted}{'s' * (number != 1)}"))
@@ -202,7 +243,8 @@ def find_topics(args: argparse.Namespace, bus: Node) -> int:
 Row = dict[str, Any]
 """A publisher or a subscription, in the form of `topic info --json`."""
 
-SOURCE = {"source": str, "priority": str, "rate": int | float, "obeyed": bool, "held": bool}  # of CommandSource
+# of CommandSource
+SOURCE = {"source": str, "priority": str, "rate": int | float, "obeyed": bool, "held": bool}
 ASK = 0.5  # s
 ENOUGH = 200  # samples, after which `info -v` stops listening
 
@@ -223,7 +265,12 @@ def topic_info(args: argparse.Namespace, bus: Node) -> int:
         raise Failure(unknown(args.key, [topic.key for topic in topics(endpoints)], bus.where))
     types = sorted({row["type"] for row in publishers + subscriptions} - {"", "any/msg/Any"})
     if args.json:
-        summary = {"key": args.key, "types": types, "publishers": publishers, "subscriptions": subscriptions}
+        summary = {
+            "key": args.key,
+            "types": types,
+            "publishers": publishers,
+            "subscriptions": subscriptions,
+        }
         print(json.dumps(summary | ({"status": status} if status else {})))
         return 0
     print(printable(f"Type: {', '.join(types) or 'unknown'}"))
@@ -237,7 +284,12 @@ def topic_info(args: argparse.Namespace, bus: Node) -> int:
 
 
 def _row(end: Endpoint) -> Row:
-    return {"node": end.node, "session": end.session, "type": end.type, "source": f"{end.node}@{end.session[:6]}"}
+    return {
+        "node": end.node,
+        "session": end.session,
+        "type": end.type,
+        "source": f"{end.node}@{end.session[:6]}",
+    }
 
 
 def _status(bus: Node, name: str, endpoints: list[Endpoint]) -> Row:
@@ -254,13 +306,17 @@ def _add_status(publishers: list[Row], status: Row) -> None:
     """Add the sim's status of each source to its publisher."""
     sources = status.get("sources")
     for source in sources if isinstance(sources, list) else ():  # the status is not validated yet
-        if isinstance(source, dict) and all(isinstance(source.get(name), kind) for name, kind in SOURCE.items()):
+        if isinstance(source, dict) and all(
+            isinstance(source.get(name), kind) for name, kind in SOURCE.items()
+        ):
             row = _row_of(publishers, source["source"])
             row |= {name: source[name] for name in SOURCE}
 
 
 def _listen(bus: Node, name: str) -> dict[str, Sample]:
-    """The last sample of each source of a key, received within LISTEN seconds or until there are ENOUGH."""
+    """The last sample of each source of a key, received within LISTEN seconds or until there are
+    ENOUGH.
+    """
     heard: dict[str, Sample] = {}
     subscriber, deadline, count = bus.subscribe_raw(name), time.monotonic() + LISTEN, 0
     while time.monotonic() < deadline and count < ENOUGH:
@@ -285,11 +341,18 @@ def _add_heard(publishers: list[Row], heard: dict[str, Sample]) -> None:
         row = _row_of(publishers, source or "anonymous")
         row["type"] = row["type"] or type_in(last.encoding)
         congestion, express = last.delivery
-        row |= {"priority": last.priority, "encoding": last.encoding, "congestion": congestion, "express": express}
+        row |= {
+            "priority": last.priority,
+            "encoding": last.encoding,
+            "congestion": congestion,
+            "express": express,
+        }
 
 
 def _add_foreign(publishers: list[Row], bus: Node, name: str) -> None:
-    """Add the node without a token that publishes a key or answers queries for it, if there is one."""
+    """Add the node without a token that publishes a key or answers queries for it, if there is
+    one.
+    """
     if found := foreign_sample(bus, name):
         sample, answered = found
         _add_heard(publishers, {sample.source: sample})
@@ -297,31 +360,44 @@ def _add_foreign(publishers: list[Row], bus: Node, name: str) -> None:
 
 
 def _line(row: Row) -> str:
-    """One publisher or subscriber: `teleop (ab12cd)  INTERACTIVE_HIGH  20.0 Hz  obeyed`."""
+    """One publisher or subscriber: `teleop (ab12cd)  person  20.0 Hz  obeyed`."""
     session = row["session"]
     words = [f"{row['node']} ({session[:6]})" if session else str(row["node"])]
-    words += [row["priority"]] if "priority" in row else []
-    words += [f"{row['rate']:.1f} Hz"] if "rate" in row else []
+    if "rate" in row:  # a source of commands
+        priority = str(row["priority"])
+        words += [SENDERS.get(priority, priority), f"{row['rate']:.1f} Hz"]
+    elif "priority" in row:
+        words += [row["priority"]]
     words += [name for name in ("obeyed", "held") if row.get(name)]
     words += [row["encoding"]] if "encoding" in row else []
-    words += [f"{row['congestion']} when full{', at once' * row['express']}"] if "congestion" in row else []
+    words += (
+        [f"{row['congestion']} when full{', at once' * row['express']}"]
+        if "congestion" in row
+        else []
+    )
     return "  ".join(map(str, words))
 
 
 def _stop(status: Row) -> str:
     text = f"; stopped by {status['stopped']}" if status.get("stopped") else ""
-    return text + ("; sources of a lower priority are held until `resume`" if status.get("held") else "")
+    waits = "; the controller, and scripts that were overruled, wait for `resume`"
+    return text + (waits if status.get("held") else "")
 
 
 def foreign_sample(bus: Node, key: str) -> tuple[Sample, bool] | None:
-    """The first sample of a key within LISTEN seconds, and whether it is a reply to our query; None without one.
+    """The first sample of a key within LISTEN seconds, and whether it is a reply to our query; None
+    without one.
 
     Foreign nodes hold no tokens: only their samples and replies reveal them.
     """
     if not bus.connected():
         return None
     # `key/**` includes the key itself, and no service takes such a query for a request.
-    subscriber, replies, deadline = bus.subscribe_raw(key), bus.ask(f"{key}/**", LISTEN), time.monotonic() + LISTEN
+    subscriber, replies, deadline = (
+        bus.subscribe_raw(key),
+        bus.ask(f"{key}/**", LISTEN),
+        time.monotonic() + LISTEN,
+    )
     while time.monotonic() < deadline:
         if sample := subscriber.try_recv():
             return sample, False
@@ -332,7 +408,9 @@ def foreign_sample(bus: Node, key: str) -> tuple[Sample, bool] | None:
 
 
 def type_in(encoding: str) -> str:
-    """The type named by an encoding such as `application/cdr;geometry_msgs/msg/Twist`; empty if it names none."""
+    """The type named by an encoding such as `application/cdr;geometry_msgs/msg/Twist`; empty if it
+    names none.
+    """
     schema = encoding.partition(";")[2]
     return schema if schema.count("/") == 2 else ""
 

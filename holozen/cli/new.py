@@ -24,20 +24,33 @@ def _robot(args: argparse.Namespace) -> tuple[dict[str, str], str]:
     file = f"{args.name}.urdf.xacro"
     wheel = args.wheel_radius or args.radius / 4
     if wheel > args.radius / 2:
-        args.error(f"--wheel-radius {wheel:g}: the wheels would be inside each other; at most half of --radius")
+        args.error(
+            f"--wheel-radius {wheel:g}: the wheels would be inside each other; at most half of "
+            "--radius"
+        )
     numbers = {"RADIUS": f"{args.radius:g}", "WHEEL": f"{wheel:g}", "MASS": f"{args.mass:g}"}
     return {file: _filled("robot.urdf.xacro", args.name, numbers)}, f"holozen sim --robot {file}"
 
 
 def _controller(args: argparse.Namespace) -> tuple[dict[str, str], str]:
     file, test = f"{args.name}.py", f"test_{args.name}.py"
-    files = {file: _filled("controller.py.txt", args.name), test: _filled("test_controller.py.txt", args.name)}
+    files = {
+        file: _filled("controller.py.txt", args.name),
+        test: _filled("test_controller.py.txt", args.name),
+    }
     return files, f"python {file}, beside `holozen sim`; python -m pytest {test}"
 
 
 def _package(args: argparse.Namespace) -> tuple[dict[str, str], str]:
-    places = {"package.xml": "", "CMakeLists.txt": "", "Battery.msg": "msg/", "NextGoal.srv": "srv/"}
-    files = {f"{args.name}/{folder}{file}": _filled(file, args.name) for file, folder in places.items()}
+    places = {
+        "package.xml": "",
+        "CMakeLists.txt": "",
+        "Battery.msg": "msg/",
+        "NextGoal.srv": "srv/",
+    }
+    files = {
+        f"{args.name}/{folder}{file}": _filled(file, args.name) for file, folder in places.items()
+    }
     return files, f"holozen interface show {args.name}/srv/NextGoal"
 
 
@@ -57,7 +70,9 @@ def _run(make: Make, args: argparse.Namespace) -> int:
 
     files, following = make(args)
     if taken := next((place for name in files if (place := _taken(name))), None):
-        raise Failure(f"{taken} exists already and is left unchanged; choose another name, or another folder")
+        raise Failure(
+            f"{taken} exists already and is left unchanged; choose another name, or another folder"
+        )
     with contextlib.ExitStack() as undo:  # what was written would be in the way of the next try
         for name, text in files.items():
             try:
@@ -76,7 +91,9 @@ def _run(make: Make, args: argparse.Namespace) -> int:
 
 
 def _taken(name: str) -> str:
-    """The path in the way of a new file: its own, or that of a parent which is not a folder; empty if none is."""
+    """The path in the way of a new file: its own, or that of a parent which is not a folder; empty
+    if none is.
+    """
     from pathlib import Path
 
     path = Path(name)
@@ -90,9 +107,18 @@ def _module(text: str) -> str:
 
     name = _name(text)
     if iskeyword(name):
-        raise refused(f"{text!r}: is a keyword of Python and cannot be imported; choose another name")
-    if (name in sys.stdlib_module_names or find_spec(name)) and not _taken(f"{name}.py") and not _taken(name):
-        raise refused(f"{text!r}: would hide the Python module of that name; choose another one, such as my_{name}")
+        raise refused(
+            f"{text!r}: is a keyword of Python and cannot be imported; choose another name"
+        )
+    if (
+        (name in sys.stdlib_module_names or find_spec(name))
+        and not _taken(f"{name}.py")
+        and not _taken(name)
+    ):
+        raise refused(
+            f"{text!r}: would hide the Python module of that name; choose another one, such as "
+            f"my_{name}"
+        )
     return name
 
 
@@ -115,14 +141,44 @@ def _verb(thing: str, about: str, example: str, make: Make, more: More | None = 
 
 def _sizes(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("--radius", type=number(0.02, 5, "m"), default=0.2, metavar="M", help="distance to the wheels (default: 0.2)")
-    add("--wheel-radius", type=number(0.005, 2, "m"), metavar="M", help="(default: a quarter of --radius)")
-    add("--mass", type=number(0.01, 500, "kg"), default=3.0, metavar="KG", help="mass of the base (default: 3)")
+    add(
+        "--radius",
+        type=number(0.02, 5, "m"),
+        default=0.2,
+        metavar="M",
+        help="distance to the wheels (default: 0.2)",
+    )
+    add(
+        "--wheel-radius",
+        type=number(0.005, 2, "m"),
+        metavar="M",
+        help="(default: a quarter of --radius)",
+    )
+    add(
+        "--mass",
+        type=number(0.01, 500, "kg"),
+        default=3.0,
+        metavar="KG",
+        help="mass of the base (default: 3)",
+    )
 
 
 VERBS = by_name(
     Noun("new", "write a small start to work on"),
-    _verb("robot", "write NAME.urdf.xacro: a base on three omni wheels", "rosie --radius 0.3", _robot, _sizes),
-    _verb("controller", "write NAME.py, which drives a robot to a place, and a test of it", "go_there", _controller),
-    _verb("package", "write NAME, a package with a message and a service", "our_interfaces", _package),
+    _verb(
+        "robot",
+        "write NAME.urdf.xacro: a base on three omni wheels",
+        "rosie --radius 0.3",
+        _robot,
+        _sizes,
+    ),
+    _verb(
+        "controller",
+        "write NAME.py, which drives a robot to a place, and a test of it",
+        "go_there",
+        _controller,
+    ),
+    _verb(
+        "package", "write NAME, a package with a message and a service", "our_interfaces", _package
+    ),
 )

@@ -31,7 +31,9 @@ def list_nodes(args: argparse.Namespace) -> int:
 
 
 def info(args: argparse.Namespace) -> int:
-    """Print what a node reads, writes and serves. Raises Failure if there is no node of that name."""
+    """Print what a node reads, writes and serves. Raises Failure if there is no node of that
+    name.
+    """
     with open_bus(args) as bus:
         endpoints = bus.endpoints()
     name, _, session = args.name.partition("@")
@@ -49,8 +51,14 @@ def _print_node(name: str, ends: list[Endpoint], as_json: bool) -> None:
     parts = {"sub": "subscribers", "pub": "publishers", "srv": "services"}
     shown = [end for end in ends if end.kind in parts and not (is_any(end) or BELOW in end.key)]
     rows = [(parts[end.kind], end.key, end.type) for end in shown]
-    rows += [("action_servers" if one.is_server else "action_clients", one.key, one.type) for one in found_in(ends)]
-    named = {part: [{"key": key, "type": type} for where, key, type in rows if where == part] for part in TITLES}
+    rows += [
+        ("action_servers" if one.is_server else "action_clients", one.key, one.type)
+        for one in found_in(ends)
+    ]
+    named = {
+        part: [{"key": key, "type": type} for where, key, type in rows if where == part]
+        for part in TITLES
+    }
     session = ends[0].session
     if as_json:
         print(json.dumps({"node": name, "session": session, **named}))
@@ -77,33 +85,53 @@ def graph(args: argparse.Namespace) -> int:
 
 
 def arrows(ends: list[Endpoint]) -> list[str]:
-    """One line per key: `teleop -> cmd_vel -> sim`; then one per service: `get_pose: pose_service`."""
+    """One line per key: `teleop -> cmd_vel -> sim`; then one per service: `get_pose:
+    pose_service`.
+    """
     rows = []
-    for topic in sorted({end.key for end in ends if end.kind in ("pub", "sub") and "*" not in end.key}):
+    for topic in sorted(
+        {end.key for end in ends if end.kind in ("pub", "sub") and "*" not in end.key}
+    ):
         writers = sorted({end.node for end in ends if end.kind == "pub" and end.key == topic})
-        readers = sorted({end.node for end in ends if end.kind == "sub" and includes(end.key, topic)})
+        readers = sorted(
+            {end.node for end in ends if end.kind == "sub" and includes(end.key, topic)}
+        )
         rows.append(f"{', '.join(writers) or '-'} -> {topic} -> {', '.join(readers) or '-'}")
     servers = [end for end in ends if end.kind == "srv"]
     for service in sorted({end.key for end in servers}):
-        rows.append(f"{service}: {', '.join(sorted({end.node for end in servers if end.key == service}))}")
+        rows.append(
+            f"{service}: {', '.join(sorted({end.node for end in servers if end.key == service}))}"
+        )
     return rows
 
 
 def dot(ends: list[Endpoint]) -> list[str]:
-    """The lines of a digraph in Graphviz's language: nodes as boxes, topics as ellipses, services as dashed ones."""
-    nodes, services = sorted({end.node for end in ends}), {end.key for end in ends if end.kind == "srv"}
+    """The lines of a digraph in Graphviz's language: nodes as boxes, topics as ellipses, services
+    as dashed ones.
+    """
+    nodes, services = (
+        sorted({end.node for end in ends}),
+        {end.key for end in ends if end.kind == "srv"},
+    )
     keys = sorted({end.key for end in ends if "*" not in end.key})
     edges = set()
     for end in ends:
         if end.kind == "sub":
-            edges |= {(key, f"node {end.node}") for key in keys if includes(end.key, key) and key not in services}
+            edges |= {
+                (key, f"node {end.node}")
+                for key in keys
+                if includes(end.key, key) and key not in services
+            }
         else:
             edges.add((f"node {end.node}", end.key))
     return [
         "digraph holozen {",
         "  rankdir=LR;",
         *(f"  {_quoted(f'node {name}')} [shape=box, label={_quoted(name)}];" for name in nodes),
-        *(f"  {_quoted(key)} [shape=ellipse{', style=dashed' * (key in services)}];" for key in keys),
+        *(
+            f"  {_quoted(key)} [shape=ellipse{', style=dashed' * (key in services)}];"
+            for key in keys
+        ),
         *(f"  {_quoted(a)} -> {_quoted(b)};" for a, b in sorted(edges)),
         "}",
     ]
@@ -115,10 +143,22 @@ def _quoted(text: str) -> str:
 
 VERBS = by_name(
     Noun("node", "inspect the running nodes"),
-    Verb("node list", "list the names of the nodes", "", partial(add_count, noun="node"), list_nodes),
-    Verb("node info", "show what a node reads, writes and serves", "sim",
-        argument("name", type=key, help="such as sim, or sim@a1b2c3 if there are several"), info),
-    Verb("graph", "show which nodes write, read and serve which keys", "--dot | dot -Tsvg > g.svg",
-        argument("--dot", action="store_true", help="in the language of Graphviz"), graph,
-        "print the ends of keys as JSON, one object per line"),
-)  # fmt: skip
+    Verb(
+        "node list", "list the names of the nodes", "", partial(add_count, noun="node"), list_nodes
+    ),
+    Verb(
+        "node info",
+        "show what a node reads, writes and serves",
+        "sim",
+        argument("name", type=key, help="such as sim, or sim@a1b2c3 if there are several"),
+        info,
+    ),
+    Verb(
+        "graph",
+        "show which nodes write, read and serve which keys",
+        "--dot | dot -Tsvg > g.svg",
+        argument("--dot", action="store_true", help="in the language of Graphviz"),
+        graph,
+        "print the ends of keys as JSON, one object per line",
+    ),
+)

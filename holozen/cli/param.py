@@ -16,97 +16,19 @@ import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from holozen.background import background
-from holozen.bus import Bus
+from holozen import parameter_yaml
 from holozen.cli.verb import Noun, Verb, by_name, open_bus
 from holozen.console import printable, report
 from holozen.flags import key, number
-from holozen.process import deferred_interrupt
-from holozen.ros import parameter_yaml
-from holozen.ros.parameter_yaml import Value, written
-from holozen.suggest import suggest
+from holozen.parameter_nodes import Nodes
+from holozen.parameter_yaml import Value, written
 from holozen.transport.errors import BusError
-from holozen.transport.graph import UNREACHED
 
 if TYPE_CHECKING:
     from holozen.messages import rcl_interfaces as r
 
-LIST = "/list_parameters"
-
 _PLAIN = re.compile(r"/?[A-Za-z][A-Za-z0-9_./]*")
 _NO_NAMES = ("y", "n", "yes", "no", "on", "off", "true", "false", "null")  # not strings in YAML 1.1
-
-
-class Nodes:
-    """The nodes with parameters (by name, their sessions), and the requests to them."""
-
-    def __init__(self, bus: Bus, timeout: float) -> None:
-        self._bus, self._timeout = bus, timeout
-        self.sessions: dict[str, list[str]] = {}
-        looking = background(bus.endpoints)
-        with deferred_interrupt():  # while nodes are discovered
-            from holozen.messages import codec, rcl_interfaces  # noqa: F401
-        for endpoint in looking():
-            if endpoint.kind == "srv" and endpoint.key.endswith(LIST):
-                self.sessions.setdefault(endpoint.key.removesuffix(LIST), []).append(endpoint.session[:6])
-
-    def only(self, name: str) -> str:
-        """`name`, if exactly one node has it. Raises BusError that lists the nodes found."""
-        found = self.sessions.get(name, [])
-        if len(found) > 1:
-            raise BusError(f"{self.twins(name)}; a request would reach any of them: end all but one")
-        if not found:
-            if hung := [end.source for end in self._bus.hidden() if end.key == f"{name}{LIST}"]:
-                raise BusError(UNREACHED.format(source=hung[0]))
-            raise BusError(f"there is no node {name!r} with parameters{self._known(name)}")
-        return name
-
-    def twins(self, name: str) -> str:
-        """The message that several nodes share a name."""
-        found = self.sessions[name]
-        return f"{len(found)} nodes are called {name!r} ({', '.join(sorted(found))})"
-
-    def names(self, node: str, prefixes: list[str] = []) -> list[str]:
-        """The parameters of a node, sorted."""
-        return sorted(self._call(node, "list_parameters", prefixes).result.names)
-
-    def values(self, node: str, names: list[str]) -> list[r.ParameterValue]:
-        """The values of the named parameters."""
-        return _as_many(self._call(node, "get_parameters", names).values, names, node)
-
-    def descriptors(self, node: str, names: list[str]) -> list[r.ParameterDescriptor]:
-        """The descriptors of the named parameters."""
-        return _as_many(self._call(node, "describe_parameters", names).descriptors, names, node)
-
-    def set(self, node: str, wanted: dict[str, Any]) -> list[r.SetParametersResult]:
-        """Set parameters, all or none of them."""
-        from holozen.messages import rcl_interfaces as r
-
-        parameters = [r.Parameter(name, r.ParameterValue.of(value)) for name, value in wanted.items()]
-        return _as_many(self._call(node, "set_parameters", parameters).results, parameters, node)
-
-    def _call(self, node: str, verb: str, *fields: Any) -> Any:
-        """The reply of a node's service to a request with these fields."""
-        from holozen.messages import named
-        from holozen.messages.codec import CodecError
-
-        kind = f"rcl_interfaces/srv/{verb.title().replace('_', '')}"
-        request, reply = named(f"{kind}_Request"), named(f"{kind}_Response")
-        try:
-            return self._bus.call(f"{node}/{verb}", request(*fields), reply, self._timeout)
-        except CodecError as error:
-            raise BusError(str(error)) from None
-
-    def _known(self, name: str) -> str:
-        if not self.sessions:
-            return "; no node has any; `holozen up` starts a robot"
-        return suggest(name, sorted(self.sessions)) or f"; there are {', '.join(sorted(self.sessions))}"
-
-
-def _as_many(found: list[Any], asked: list[Any], node: str) -> list[Any]:
-    if len(found) != len(asked):
-        raise BusError(f"{node} replied with {len(found)} results for {len(asked)} parameters")
-    return found
 
 
 def list_names(args: argparse.Namespace) -> int:
@@ -116,16 +38,23 @@ def list_names(args: argparse.Namespace) -> int:
         nodes = Nodes(bus, args.timeout)
         for node in [nodes.only(args.node)] if args.node else sorted(nodes.sessions):
             if len(nodes.sessions[node]) > 1:
-                report(f"holozen {args.verb}: {nodes.twins(node)}; only one of them is shown: end the others")
+                report(
+                    f"holozen {args.verb}: {nodes.twins(node)}; only one of them is shown: end "
+                    "the others"
+                )
                 code = 1
             names = nodes.names(node, args.param_prefixes)
-            described = nodes.descriptors(node, names) if names and (args.param_type or args.json) else []
+            described = (
+                nodes.descriptors(node, names) if names and (args.param_type or args.json) else []
+            )
             kinds = {row.name: _word(row.type) for row in described}
             if not args.node and not args.json:
                 print(printable(f"{node}:"))
             for name in names:
                 row = {"node": node, "name": name, "type": kinds.get(name)}
-                _show(args, row, f"  {name}" + (f" (type: {kinds[name]})" if args.param_type else ""))
+                _show(
+                    args, row, f"  {name}" + (f" (type: {kinds[name]})" if args.param_type else "")
+                )
     if not nodes.sessions:
         report("no parameters: no node has any; `holozen up` starts a robot")
     return code
@@ -136,7 +65,11 @@ def get(args: argparse.Namespace, nodes: Nodes, node: str) -> int:
     (value,) = nodes.values(node, [args.name])
     plain = value.plain()
     text = "" if args.hide_type else f"{_word(value.type).title()} value is: "
-    _show(args, _row(node, args.name, value), text + (plain if isinstance(plain, str) else json.dumps(plain)))
+    _show(
+        args,
+        _row(node, args.name, value),
+        text + (plain if isinstance(plain, str) else json.dumps(plain)),
+    )
     return 0
 
 
@@ -163,11 +96,22 @@ def _set(args: argparse.Namespace, wanted: dict[str, Any]) -> int:
         node = nodes.only(args.node)
         results = nodes.set(node, wanted)
     for (name, value), result in zip(wanted.items(), results, strict=True):
-        row = {"node": node, "name": name, "value": value, "successful": result.successful, "reason": result.reason}
-        what = f"Set parameter {name}" if len(wanted) > 1 or args.verb == "param load" else "Set parameter"
+        row = {
+            "node": node,
+            "name": name,
+            "value": value,
+            "successful": result.successful,
+            "reason": result.reason,
+        }
+        what = (
+            f"Set parameter {name}"
+            if len(wanted) > 1 or args.verb == "param load"
+            else "Set parameter"
+        )
         if result.successful or args.json:
             _show(args, row, f"{what} successful")
-        elif not result.reason.startswith("not set"):  # that reason only means that another one was refused
+        # that reason only means that another one was refused
+        elif not result.reason.startswith("not set"):
             report(f"holozen {args.verb}: {what.replace('Set', 'setting')} failed: {result.reason}")
     done = all(result.successful for result in results)
     if not done and len(wanted) > 1:
@@ -181,13 +125,25 @@ def describe(args: argparse.Namespace, nodes: Nodes, node: str) -> int:
         ranges: list[Any] = [*row.floating_point_range, *row.integer_range]
         low, high = (ranges[0].from_value, ranges[0].to_value) if ranges else (None, None)
         described = {
-            "node": node, "name": row.name, "type": _word(row.type), "description": row.description,
-            "read_only": row.read_only, "min": low, "max": high, "constraints": row.additional_constraints,
-        }  # fmt: skip
-        lines = [f"Parameter name: {row.name}", f"  Type: {_word(row.type)}", f"  Description: {row.description}"]
+            "node": node,
+            "name": row.name,
+            "type": _word(row.type),
+            "description": row.description,
+            "read_only": row.read_only,
+            "min": low,
+            "max": high,
+            "constraints": row.additional_constraints,
+        }
+        lines = [
+            f"Parameter name: {row.name}",
+            f"  Type: {_word(row.type)}",
+            f"  Description: {row.description}",
+        ]
         lines += ["  Constraints:"] + ["    Read only: true"] * row.read_only
         lines += [f"    Min value: {low}", f"    Max value: {high}"] if ranges else []
-        lines += [f"    Additional constraints: {row.additional_constraints}"] * bool(row.additional_constraints)
+        lines += [f"    Additional constraints: {row.additional_constraints}"] * bool(
+            row.additional_constraints
+        )
         _show(args, described, *lines)
     return 0
 
@@ -221,8 +177,8 @@ def _show(args: argparse.Namespace, row: dict[str, Any], *lines: str) -> None:
 
 
 def typed(text: str) -> Value:
-    """The value that a word has in a parameter file; what has none there stays text, which a node that expects another
-    type refuses.
+    """The value that a word has in a parameter file; what has none there stays text, which a node
+    that expects another type refuses.
     """
     try:
         found = parameter_yaml.parse(text)
@@ -235,19 +191,31 @@ def typed(text: str) -> Value:
 def file_lines(node: str, values: dict[str, Any]) -> list[str]:
     """The lines of the file that holds a node's `values`."""
     rows = [f"    {_written_name(name)}: {written(value)}" for name, value in values.items()]
-    return [f"{_written_name('/' + node)}:", f"  {parameter_yaml.KEY}:" + ("" if rows else " {}"), *rows]
+    return [
+        f"{_written_name('/' + node)}:",
+        f"  {parameter_yaml.KEY}:" + ("" if rows else " {}"),
+        *rows,
+    ]
 
 
 def read_file(path: str, node: str, wildcards: bool = True) -> dict[str, Value]:
-    """The values that a file has for a node. Raises BusError with the reason and the file's sections."""
+    """The values that a file has for a node. Raises BusError with the reason and the file's
+    sections.
+    """
     try:
         sections = parameter_yaml.read(path)
     except ValueError as error:
         raise BusError(str(error)) from None
     full = f"/{node}"
-    mine = [section for section in sections if (section.is_for(full) if wildcards else section.place == full)]
+    mine = [
+        section
+        for section in sections
+        if (section.is_for(full) if wildcards else section.place == full)
+    ]
     if not mine:
-        there = ", ".join(section.place for section in sections) or f"none with {parameter_yaml.KEY}"
+        there = (
+            ", ".join(section.place for section in sections) or f"none with {parameter_yaml.KEY}"
+        )
         raise BusError(f"{path}: it has no section for the node {node!r}; sections: {there}")
     found: dict[str, Value] = {}
     for section in mine:  # its own section comes last, and overrides those with wildcards
@@ -255,7 +223,11 @@ def read_file(path: str, node: str, wildcards: bool = True) -> dict[str, Value]:
     if not found:
         raise BusError(f"{path}: it has no parameter for the node {node!r}")
     for name, value in found.items():
-        numbers = [each for each in (value if isinstance(value, list) else [value]) if isinstance(each, float)]
+        numbers = [
+            each
+            for each in (value if isinstance(value, list) else [value])
+            if isinstance(each, float)
+        ]
         if not all(map(math.isfinite, numbers)):
             raise BusError(f"{path}: {name} is {value}; write a finite number")
     return found
@@ -265,7 +237,9 @@ def _written_name(name: str) -> str:
     return name if _PLAIN.fullmatch(name) and name.lower() not in _NO_NAMES else written(name)
 
 
-def _of_node(work: Callable[[argparse.Namespace, Nodes, str], int]) -> Callable[[argparse.Namespace], int]:
+def _of_node(
+    work: Callable[[argparse.Namespace, Nodes, str], int],
+) -> Callable[[argparse.Namespace], int]:
     """The `run` of a verb that works on the one node that its arguments name."""
 
     def run(args: argparse.Namespace) -> int:
@@ -284,7 +258,13 @@ def _arguments(verb: str) -> Callable[[argparse.ArgumentParser], None]:
         if verb == "list":
             add("node", nargs="?", type=key, metavar="NODE")
             add("--param-type", action="store_true", help="with their types")
-            add("--param-prefixes", nargs="+", default=[], metavar="PREFIX", help="only those below: PREFIX.name")
+            add(
+                "--param-prefixes",
+                nargs="+",
+                default=[],
+                metavar="PREFIX",
+                help="only those below: PREFIX.name",
+            )
         else:
             add("node", type=key, metavar="NODE")
         if verb == "get":
@@ -305,14 +285,30 @@ def _arguments(verb: str) -> Callable[[argparse.ArgumentParser], None]:
 
 VERBS = by_name(
     Noun("param", "read and set the parameters of running nodes"),
-    *(Verb(f"param {name}", about, example, _arguments(name), run)
-    for name, about, example, run in (
-        ("list", "list the parameters of all nodes, or of one", "", list_names),
-        ("get", "show the value of one", "sim max_linear", _of_node(get)),
-        ("set", "set one or more, all or none of them", "sim max_linear 0.5", set_values),
-        ("describe", "describe parameters, and the values that they accept", "sim max_linear", _of_node(describe)),
-        ("dump", "print all values of a node, as YAML that `load` reads", "controller > controller.yaml",
-            _of_node(dump)),
-        ("load", "set the values of a file that `dump` wrote, all or none of them", "controller controller.yaml", load),
-    ))
-)  # fmt: skip
+    *(
+        Verb(f"param {name}", about, example, _arguments(name), run)
+        for name, about, example, run in (
+            ("list", "list the parameters of all nodes, or of one", "", list_names),
+            ("get", "show the value of one", "sim max_linear", _of_node(get)),
+            ("set", "set one or more, all or none of them", "sim max_linear 0.5", set_values),
+            (
+                "describe",
+                "describe parameters, and the values that they accept",
+                "sim max_linear",
+                _of_node(describe),
+            ),
+            (
+                "dump",
+                "print all values of a node, as YAML that `load` reads",
+                "controller > controller.yaml",
+                _of_node(dump),
+            ),
+            (
+                "load",
+                "set the values of a file that `dump` wrote, all or none of them",
+                "controller controller.yaml",
+                load,
+            ),
+        )
+    ),
+)

@@ -1,4 +1,6 @@
-"""`holozen plot` and `map`: draw fields of live messages, and robots seen from above, in the terminal."""
+"""`holozen plot` and `map`: draw fields of live messages, and robots seen from above, in the
+terminal.
+"""
 
 from __future__ import annotations
 
@@ -10,24 +12,19 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any
 
 from holozen.bus import Bus
-from holozen.cli.fields import path, pick
 from holozen.cli.hints import suggest_key
-from holozen.cli.output import Reader
 from holozen.cli.verb import Verb, by_name, open_bus
 from holozen.console import Failure, Screen, printable, report
+from holozen.field_lines import Field, Lines
+from holozen.fields import path
 from holozen.flags import add_packages, number
+from holozen.output import SampleReader
 from holozen.plotting import Plane, Point, Robot, draw, panels
 from holozen.process import stop_event
 from holozen.transport.errors import ServiceError
-from holozen.transport.samples import RawSubscriber
 
-Field = tuple[str, str, tuple[str | int, ...]]
-"""A field: as written on the command line, its key, and its path in the messages."""
-
-MAX_POINTS = 5000  # points of a line in the plot
 TICK = 0.02  # s between two polls
 TRAIL = 2000  # points
 STEP = 0.02  # m between two points of a trail
@@ -41,7 +38,7 @@ def plot(args: argparse.Namespace) -> int:
     """Draw the fields of `args`, or print them as JSON, until interrupted."""
     stop = stop_event()
     with open_bus(args, stop=stop) as bus:
-        lines = Lines(bus, args.fields, Reader(packages=args.package))
+        lines = Lines(bus, args.fields, SampleReader(packages=args.package))
         keys = [key for _, key, _ in args.fields]
         hint = "" if args.once else suggest_key(bus, keys)
         waiting = f"waiting for {', '.join(dict.fromkeys(keys))}{hint}" if hint else ""
@@ -59,56 +56,6 @@ def plot(args: argparse.Namespace) -> int:
         raise Failure(f"no messages on {', '.join(dict.fromkeys(keys))}{hint}")
 
 
-class Lines:
-    """The points of each field, as they arrive: the time by `clock`, and the value."""
-
-    def __init__(
-        self, bus: Bus, fields: list[Field], reader: Reader, clock: Callable[[], float] = time.monotonic
-    ) -> None:
-        self.points: dict[str, deque[tuple[float, float]]] = {name: deque(maxlen=MAX_POINTS) for name, _, _ in fields}
-        self.bad = 0  # messages that could not be decoded
-        self._fields, self._bus, self._reader, self._clock = fields, bus, reader, clock
-        self._subscribers: dict[str, RawSubscriber] = {}
-        for key in dict.fromkeys(key for _, key, _ in fields):
-            self._subscribers[key] = bus.subscribe_raw(key)
-            self._subscribers[key].ends.append(bus.announce("sub", "any/msg/Any", key))
-
-    def take(self) -> list[dict[str, float]]:
-        """Take in the messages that wait, and return their rows. Raises LookupError for a missing field."""
-        rows = []
-        for key, subscriber in self._subscribers.items():
-            while (sample := subscriber.try_recv()) is not None:
-                value = self._reader.read(sample, self._bus)
-                if isinstance(value, dict | list):
-                    rows.append(self._add(key, value))
-                else:
-                    self.bad += 1
-        return rows
-
-    def _add(self, key: str, value: Any) -> dict[str, float]:
-        row = {}
-        for name, its, place in self._fields:
-            if its == key:
-                try:
-                    row[name] = _number(pick(value, place))
-                except LookupError as error:
-                    raise LookupError(f"{name}: {error.args[0]}") from None
-                self.points[name].append((self._clock(), row[name]))
-        return row
-
-    def close(self) -> None:
-        """Stop listening."""
-        for subscriber in self._subscribers.values():
-            subscriber.close()
-
-
-def _number(value: Any) -> float:
-    if isinstance(value, bool | int | float):
-        return float(value)
-    inside = f"; it has {', '.join(map(str, value))}" if isinstance(value, dict) else ""
-    raise LookupError(f"it is not a number{inside}")
-
-
 def _print_rows(lines: Lines, args: argparse.Namespace, stop: threading.Event) -> None:
     end = time.monotonic() + args.window if args.once else float("inf")
     while time.monotonic() < end and not stop.wait(TICK):
@@ -117,11 +64,16 @@ def _print_rows(lines: Lines, args: argparse.Namespace, stop: threading.Event) -
 
 
 def _draw(lines: Lines, args: argparse.Namespace, stop: threading.Event, waiting: str) -> None:
-    """Draw until interrupted. `waiting` is shown until there is a first point: the screen hides earlier lines."""
+    """Draw until interrupted. `waiting` is shown until there is a first point: the screen hides
+    earlier lines.
+    """
     picture: list[str] = []
     with Screen(args.once, args.ascii) as screen:
         for now in _due(screen, lines.take, args.window if args.once else 0.0, stop):
-            picture = [printable(line) for line in panels(lines.points, now, args.window, screen.size, screen.ascii)]
+            picture = [
+                printable(line)
+                for line in panels(lines.points, now, args.window, screen.size, screen.ascii)
+            ]
             if args.once:
                 break
             if waiting and not any(lines.points.values()):
@@ -131,8 +83,12 @@ def _draw(lines: Lines, args: argparse.Namespace, stop: threading.Event, waiting
         print("\n".join(line.rstrip() for line in picture), flush=True)
 
 
-def _due(screen: Screen, take: Callable[[], object], first: float, stop: threading.Event) -> Iterator[float]:
-    """The times at which to draw, the first after `first` seconds, until `stop` is set. `take` is called in between."""
+def _due(
+    screen: Screen, take: Callable[[], object], first: float, stop: threading.Event
+) -> Iterator[float]:
+    """The times at which to draw, the first after `first` seconds, until `stop` is set. `take` is
+    called in between.
+    """
     due = time.monotonic() + first
     while not stop.wait(TICK):
         take()
@@ -170,7 +126,9 @@ def _watch(watcher: Watcher, args: argparse.Namespace, stop: threading.Event) ->
 
 
 def _plane_as_json(plane: Plane) -> dict[str, object]:
-    robots = [{"name": robot.name, "x": robot.x, "y": robot.y, "yaw": robot.yaw} for robot in plane.robots]
+    robots = [
+        {"name": robot.name, "x": robot.x, "y": robot.y, "yaw": robot.yaw} for robot in plane.robots
+    ]
     seen = [[round(x, 3), round(y, 3)] for x, y in plane.seen]
     return {"robots": robots, "goals": plane.goals, "objects": plane.objects, "seen": seen}
 
@@ -197,7 +155,9 @@ class Scanner:
             for index, far in enumerate(scan.ranges):
                 if scan.range_min <= far <= scan.range_max:
                     angle = scan.angle_min + index * scan.angle_increment
-                    self.points.append(at.apply((far * math.cos(angle), far * math.sin(angle), 0.0))[:2])
+                    self.points.append(
+                        at.apply((far * math.cos(angle), far * math.sin(angle), 0.0))[:2]
+                    )
 
     def close(self) -> None:
         """Stop listening."""
@@ -206,7 +166,9 @@ class Scanner:
 
 
 class Watcher:
-    """Follows the odometry of all robots and the scans of their lidars, and asks for goals and objects in a thread."""
+    """Follows the odometry of all robots and the scans of their lidars, and asks for goals and
+    objects in a thread.
+    """
 
     def __init__(self, bus: Bus) -> None:
         from holozen.messages import CommandStatus, Odometry
@@ -219,7 +181,8 @@ class Watcher:
         self._ends = self._graph.settled(bus.connected)
         self._bus, self._odom = bus, bus.subscribe("**/odom", Odometry, depth=1024)
         self._trails: dict[str, deque[Point]] = {}
-        self._status = bus.latest("cmd_vel_status", CommandStatus)  # knows the name of the robot at the root
+        # knows the name of the robot at the root
+        self._status = bus.latest("cmd_vel_status", CommandStatus)
         self._ended = threading.Event()
         self._asking = threading.Thread(target=self._ask, daemon=True)
         self._asking.start()
@@ -245,14 +208,18 @@ class Watcher:
             Robot(name or root, x, y, yaw, [*self._trails[name], (x, y)])
             for name, (x, y, yaw) in sorted(self.poses.items())
         ]
-        others = {name: at for name, at in self.objects.items() if name not in self.poses and name != root}
+        others = {
+            name: at for name, at in self.objects.items() if name not in self.poses and name != root
+        }
         first = ", ".join(map(_place, robots[:MAX_PLACES]))
         more = f" and {len(robots) - MAX_PLACES} more" if len(robots) > MAX_PLACES else ""
         seen = [point for scanner in self._scanners.values() for point in scanner.points]
         return Plane(robots, self.goals, others, first + more, seen)
 
     def join(self) -> None:
-        """Wait for the polling thread once the bus is closed: no thread may be inside Zenoh at exit."""
+        """Wait for the polling thread once the bus is closed: no thread may be inside Zenoh at
+        exit.
+        """
         self._ended.set()
         self._asking.join(ASK_EVERY + PATIENCE)
 
@@ -267,7 +234,9 @@ class Watcher:
         for new in keys - self._scanners.keys():
             owners = [start for start in robots if new.startswith(start)]
             if owners:
-                self._scanners[new] = Scanner(self._bus, new, max(owners, key=len).removesuffix("/"))
+                self._scanners[new] = Scanner(
+                    self._bus, new, max(owners, key=len).removesuffix("/")
+                )
 
     def _move(self, name: str, x: float, y: float, yaw: float) -> None:
         trail = self._trails.setdefault(name, deque(maxlen=TRAIL))
@@ -306,7 +275,9 @@ class Watcher:
 
         scenes = self._bus.call_all("get_scene", GetSceneRequest(), GetSceneReply, PATIENCE)
         entities = [entity for scene in scenes for entity in scene.entities]
-        return {entity.name: (entity.pose.position.x, entity.pose.position.y) for entity in entities}
+        return {
+            entity.name: (entity.pose.position.x, entity.pose.position.y) for entity in entities
+        }
 
 
 def _place(robot: Robot) -> str:
@@ -315,44 +286,103 @@ def _place(robot: Robot) -> str:
 
 def _plot_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("fields", nargs="+", type=_field, metavar="KEY.FIELD", help="such as joint_states.position[0]")
+    add(
+        "fields",
+        nargs="+",
+        type=chosen_field,
+        metavar="KEY.FIELD",
+        help="such as joint_states.position[0]",
+    )
     seconds = number(0.1, 3600, "s")
-    add("-w", "--window", type=seconds, default=10.0, metavar="S", help="seconds shown (default: 10)")
-    add("--once", action="store_true", help="watch for one window, print one picture (or its numbers) and end")
+    add(
+        "-w",
+        "--window",
+        type=seconds,
+        default=10.0,
+        metavar="S",
+        help="seconds shown (default: 10)",
+    )
+    add(
+        "--once",
+        action="store_true",
+        help="watch for one window, print one picture (or its numbers) and end",
+    )
     add_packages(parser)
     add("--ascii", action="store_true", help="without braille")
 
 
-def _field(text: str) -> Field:
+def chosen_field(text: str) -> Field:
+    """The field that KEY.FIELD names. Raises ArgumentTypeError, with what was probably meant."""
     start = text.rpartition("/")[2]
     name, _, rest = start.partition(".")
     key = text[: len(text) - len(start)] + name
     if not (name and rest):
-        raise argparse.ArgumentTypeError(f"{text!r}: write KEY.FIELD, such as odom.twist.twist.linear.x")
+        raise argparse.ArgumentTypeError(f"{text!r}: write KEY.FIELD, such as {_example(text)}")
     try:
         return text, key.removeprefix("/"), path(rest)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
+_FIELDS = {
+    "odom": "twist.twist.linear.x",
+    "cmd_vel": "linear.x",
+    "joint_states": "position[0]",
+    "imu": "angular_velocity.z",
+    "scan": "ranges[0]",
+}
+"""A field to plot of each key."""
+
+
+def _example(text: str) -> str:
+    """A field of the key that `text` may mean: of `a/odom/twist` one of `a/odom`."""
+    parts = text.strip("/").split("/")
+    for count in range(len(parts), 0, -1):
+        if field := _FIELDS.get(parts[count - 1]):
+            return f"{'/'.join(parts[:count])}.{field}"
+    return f"odom.{_FIELDS['odom']}"
+
+
 def _map_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--once", action="store_true", help="print one picture and end")
-    add("-w", "--wait", type=number(0.1, 3600, "s"), default=1.0, metavar="S",
-        help="with --once or --json: watch for S seconds first (default: 1)")  # fmt: skip
+    add(
+        "-w",
+        "--wait",
+        type=number(0.1, 3600, "s"),
+        default=1.0,
+        metavar="S",
+        help="with --once or --json: watch for S seconds first (default: 1)",
+    )
     add("--ascii", action="store_true", help="without braille")
 
 
 _PLOT = partial(
-    Verb, about="draw fields of live messages in the terminal, until Ctrl-C",
-    example="odom.twist.twist.linear.x cmd_vel.linear.x", arguments=_plot_arguments, run=plot,
+    Verb,
+    about="draw fields of live messages in the terminal, until Ctrl-C",
+    example="odom.twist.twist.linear.x cmd_vel.linear.x",
+    arguments=_plot_arguments,
+    run=plot,
     json="print the numbers as they arrive as JSON, one object per line",
-)  # fmt: skip
-ABOUT_MAP = "draw the robots, their paths, their goals and what their lidars see in the terminal, until Ctrl-C"
-NOTES_MAP = "East is x, north is y. Positions are those of odom: with encoders, relative to where a robot started."
+)
+ABOUT_MAP = (
+    "draw the robots, their paths, their goals and what their lidars see in the terminal, "
+    "until Ctrl-C"
+)
+NOTES_MAP = (
+    "East is x, north is y. Positions are those of odom: with encoders, relative to where "
+    "a robot started."
+)
 VERBS = by_name(
     _PLOT("plot"),
     _PLOT("topic plot"),
-    Verb("map", ABOUT_MAP, "--once", _map_arguments, draw_map,
-        "print what a picture would show as JSON, one object per line", NOTES_MAP),
-)  # fmt: skip
+    Verb(
+        "map",
+        ABOUT_MAP,
+        "--once",
+        _map_arguments,
+        draw_map,
+        "print what a picture would show as JSON, one object per line",
+        NOTES_MAP,
+    ),
+)

@@ -1,4 +1,6 @@
-"""`holozen topic pub`: publish validated messages on a key, and report whether they arrive and are obeyed."""
+"""`holozen topic pub`: publish validated messages on a key, and report whether they arrive and are
+obeyed.
+"""
 
 from __future__ import annotations
 
@@ -9,144 +11,263 @@ import queue
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
+from itertools import count
 from typing import Any
 
 from holozen import wire
 from holozen.bus import Bus
 from holozen.cli import values
-from holozen.cli.fields import as_object
+from holozen.cli.form import Form, form_of, form_of_listener
 from holozen.cli.hints import suggest_key
-from holozen.cli.output import decode
 from holozen.command.feedback import CommandFeedback
+from holozen.command.outcome import Outcome
 from holozen.console import Failure, report
-from holozen.limits import not_finite
-from holozen.messages import WIRES, CodecError, encoding_of
-from holozen.messages.definitions import Interface, InterfaceError, completed, with_mappings
+from holozen.fields import as_object
+from holozen.messages import WIRES, CodecError
+from holozen.messages.definitions import Interface, InterfaceError, completed
 from holozen.messages.registry import Registry
+from holozen.output import decode
 from holozen.process import stop_event
-from holozen.suggest import listed, suggest
+from holozen.suggest import listed
+from holozen.transport import connection
+from holozen.transport.beat import Echoes
+from holozen.transport.denied import denied
 from holozen.transport.graph import Endpoint, on_key, subscribers
 from holozen.transport.pubsub import Latest, RawPublisher, Subscription
 from holozen.transport.samples import Sample
 
 STOPS, STOP_EVERY = 5, 0.02  # s
-CLOCK_PATIENCE = 0.2  # s to wait for the robot to ask for our clock
-LOOK = 0.1  # s between two checks for a line of standard input
-VERDICT = 0.3, 2.0  # s to wait for the sim's status, which comes at 10 Hz: where none was found, and where one was
+WAITING = "waiting for the robot: its beat is not heard yet"
+NO_BEAT = (
+    "the robot is there, but does not beat: nothing was sent within {seconds:g} s; `holozen "
+    "doctor` looks why"
+)
+NOTICE = 0.5  # s of waiting for a beat after which that is reported
+BEAT_PATIENCE = 5.0  # s to wait for a beat where no --max-wait is given
+STOP_CHECK = 0.1  # s of waiting for a line of standard input between two checks whether to stop
+# s to wait for the robot's status, which comes at 10 Hz, where none was found
+VERDICT_WITHOUT_STATUS = 0.3
+VERDICT_WITH_STATUS = 2.0  # s, where one was
+# s; a robot that stands may take the first command over a slow link for a late one
+AGAIN, AGAIN_AFTER = (5, 0.1)
 PAUSED = "; the sim is paused; `holozen sim play` continues it"
 LEFT = "; it has left, and its last command counts until the robot's timeout: try again in a moment"
-FORCE = "; --force sends it all the same"
 
 
 def publish(bus: Bus, args: argparse.Namespace, looking: Callable[[], list[Endpoint]]) -> int:
-    """Publish according to the flags. `looking` waits for the first query of the graph and returns its endpoints."""
+    """Publish according to the flags. `looking` waits for the first query of the graph and returns
+    its endpoints.
+    """
     if set(args.key) & set("*$?#"):
         raise Failure(f"{args.key!r}: write to one key; a wildcard would move every robot")
-    form = _form(args)
+    form = form_of(args)
     payload = _payload(form, args) if form else None
     _ = bus.session  # open it first, so that Ctrl-C also ends the wait for a router
     stop = stop_event()
-    form = form or _form_of_listener(looking(), args)
-    return _run(bus, args, form, payload or _payload(form, args), stop, looking)
+    if form is None:
+        form = form_of_listener(looking(), args)
+        payload = _payload(form, args)
+    return _run(bus, args, form, payload, stop, looking)
 
 
 def _run(
     bus: Bus,
     args: argparse.Namespace,
     form: Form,
-    payload: bytes,
+    payload: bytes | None,
     stop: threading.Event,
     looking: Callable[[], list[Endpoint]],
 ) -> int:
+    """Publish the payload as often as the flags say, or without one the lines of standard input."""
     publisher = bus.publisher_raw(args.key, form.kind.name, form.encoding, dead_man=False)
-    matched = 0 if args.no_wait else _matched(bus, publisher, args, stop, looking)
-    if not args.no_wait:
-        counted = f"{matched or 'no'} subscriber{'s' * (matched != 1)} of {args.key}"
-        counted += "" if matched else suggest_key(bus, [args.key], ("sub",))
-        if not matched and (args.once or args.times):
-            raise Failure(counted)
-        report(counted)
-        if args.wait and matched < args.wait and not stop.is_set():
-            raise Failure(f"{args.key}: {args.wait} subscribers did not come in time, so nothing is published")
+    for why in denied(bus, connection.from_arguments(args), [args.key]).values():
+        raise Failure(why)
+    matched = 0 if args.no_wait else _await_subscribers(bus, publisher, args, stop, looking)
     status_key = form.status_key
     feedback = command_feedback(bus, status_key, form.is_velocity) if status_key else None
-    if feedback and matched and payload not in form.stops:
-        bus.clock_asked.wait(CLOCK_PATIENCE)  # only a stop is obeyed before the robot knows our clock
-    turns = _lines(form, args, stop) if args.stdin else _turns(form, payload, args, stop)
-    sent = 0
+    if publisher.echoes and payload not in form.stops:
+        _wait_for_beat(publisher.echoes, args, stop)
+    sending = Sending(publisher, form, feedback, stop)
     try:
-        for each in turns:
-            publisher.put_bytes(each)
-            sent += 1
-            if feedback:
-                feedback.sent(form.command)
-        if feedback and (args.once or args.times) and matched:
-            feedback.wait(stop, VERDICT[bool(on_key(looking(), status_key, "pub"))])
+        if payload is None:
+            sending.send_all(_lines(form, args, stop))
+        else:
+            sending.send_all(_turns(form, payload, args, stop, sending.pause))
+        if status_key and (args.once or args.times) and matched:
+            has_status = bool(on_key(looking(), status_key, "pub"))
+            sending.await_verdict(has_status, again=payload if args.once else None)
     finally:
-        if form.stops and not args.once:
-            _stop_robot(publisher, form.stops)
-            if feedback:
-                feedback.report_held()
+        sending.end(stops_robot=not args.once)
     if args.json:
-        print(json.dumps({"key": args.key, "type": form.kind.name, "subscribers": matched, "published": sent}))
+        print(
+            json.dumps(
+                {
+                    "key": args.key,
+                    "type": form.kind.name,
+                    "subscribers": matched,
+                    "published": sending.count,
+                }
+            )
+        )
     if not (args.once or args.times):
         return 0
-    if not feedback or not feedback.refusal:
-        return int(matched and form.is_goal and _is_only_watched(bus, args.key))
-    return int(payload not in form.stops or not feedback.stands)
+    if feedback and feedback.refusal:
+        return int(payload not in form.stops or not feedback.stands)
+    return int(matched > 0 and form.is_goal and _report_without_controller(bus, args.key))
 
 
-def _is_only_watched(bus: Bus, key: str) -> bool:
-    """Report that no controller reads a goal, if all subscribers of its key read any type, as `topic echo` does."""
+class Sending:
+    """Sends messages on one key, and follows what a robot makes of them.
+
+    Attributes:
+        count: How many messages were sent.
+    """
+
+    def __init__(
+        self,
+        publisher: RawPublisher,
+        form: Form,
+        feedback: CommandFeedback | None,
+        stop: threading.Event,
+    ) -> None:
+        self._publisher, self._form, self._feedback, self._stop = publisher, form, feedback, stop
+        self.count = 0
+
+    def send_all(self, payloads: Iterable[bytes]) -> None:
+        """Send each payload."""
+        for payload in payloads:
+            self._send(payload)
+
+    def _send(self, payload: bytes) -> None:
+        if self._put(payload):
+            self.count += 1
+            if self._feedback:
+                self._feedback.sent(self._form.command)
+
+    def _put(self, payload: bytes) -> bool:
+        """Send a message. A motion goes with an echo, or as a foreign program's, without a number,
+        where no robot that beats is there. Returns False if it was not sent: the robot has come
+        anew, and its beat was not heard yet.
+        """
+        echoes = self._publisher.echoes
+        if echoes and payload not in self._form.stops and not echoes.heard:
+            if not echoes.may_command():
+                return False
+            if not echoes.has_receiver:
+                self._publisher.put_plain(payload)
+                return True
+        self._publisher.put_bytes(payload)
+        return True
+
+    def pause(self, seconds: float) -> None:
+        """Wait after a message was sent, until `stop` is set."""
+        if self._feedback:
+            self._feedback.pause(self._stop, seconds)
+        else:
+            self._stop.wait(seconds)
+
+    def await_verdict(self, has_status: bool, again: bytes | None) -> None:
+        """Wait for what the robot makes of the last message, longer where it `has_status`. Send the
+        payload `again` while that comes too late to begin with.
+        """
+        feedback = self._feedback
+        if feedback is None:
+            return
+        patience = VERDICT_WITH_STATUS if has_status else VERDICT_WITHOUT_STATUS
+        feedback.wait(self._stop, patience)
+        if again is None:
+            return
+        for _ in range(AGAIN):
+            if not feedback.refusal.startswith(Outcome.HELD_UP.value) or self._stop.wait(
+                AGAIN_AFTER
+            ):
+                return
+            seen = feedback.statuses
+            self._send(again)
+            feedback.wait(self._stop, patience, seen)
+
+    def end(self, stops_robot: bool) -> None:
+        """Report what is left to be reported. With `stops_robot`, stop first what the messages
+        move: each stop is sent several times, because a congested link may drop some.
+        """
+        stops = self._form.stops if stops_robot else set()
+        for _ in range(STOPS if stops else 0):
+            for payload in stops:
+                self._publisher.put_bytes(payload)
+            time.sleep(STOP_EVERY)
+        if self._feedback:
+            self._feedback.told()
+            if stops:
+                self._feedback.report_held()
+
+
+def _payload(form: Form, args: argparse.Namespace) -> bytes | None:
+    """The bytes of the value; None if values come line by line. Raises Failure."""
+    return None if args.stdin else _encoded(form, args)
+
+
+def _encoded(form: Form, args: argparse.Namespace) -> bytes:
+    try:
+        return form.payload(args.value)
+    except ValueError as error:
+        raise Failure(f"{args.key}: refused: {error}") from None
+
+
+def _await_subscribers(
+    bus: Bus,
+    publisher: RawPublisher,
+    args: argparse.Namespace,
+    stop: threading.Event,
+    looking: Callable[[], list[Endpoint]],
+) -> int:
+    """Wait for subscribers, and report and return their number. Raises Failure if there are too few
+    to publish.
+    """
+    matched = _matched(bus, publisher, args, stop, looking)
+    counted = f"{matched or 'no'} subscriber{'s' * (matched != 1)} of {args.key}"
+    if not matched:
+        counted += suggest_key(bus, [args.key], ("sub",))
+        if args.once or args.times:
+            raise Failure(counted)
+    report(counted)
+    if args.wait and matched < args.wait and not stop.is_set():
+        raise Failure(
+            f"{args.key}: {args.wait} subscribers did not come in time, so nothing is published"
+        )
+    return matched
+
+
+def _wait_for_beat(echoes: Echoes, args: argparse.Namespace, stop: threading.Event) -> None:
+    """Wait until a beat of a robot that is there was heard. Raises Failure if that takes too
+    long.
+    """
+    echoes.settle()
+    limit = args.max_wait or BEAT_PATIENCE
+    deadline, reported = time.monotonic() + limit, False
+    while echoes.awaited and not stop.is_set():
+        if time.monotonic() > deadline:
+            raise Failure(f"{args.key}: {NO_BEAT.format(seconds=limit)}")
+        if not reported and time.monotonic() > deadline - limit + NOTICE:
+            report(f"{args.key}: {WAITING}")
+            reported = True
+        stop.wait(0.002)
+
+
+def _report_without_controller(bus: Bus, key: str) -> bool:
+    """Report that no controller reads a goal, if all subscribers of its key read any type, as
+    `topic echo` does. Returns whether that is so.
+    """
     ends = on_key(bus.graph().settled(bus.connected), key, "sub")
     if not ends or any(end.type != "any/msg/Any" for end in ends):  # a foreign one has no token
         return False
     command = " ".join(filter(None, ("holozen controller", key.rpartition("/")[0], "--laps 0")))
-    report(f"{key}: no controller reads it, only {listed(end.node for end in ends)}; `{command}` drives there")
-    return True
-
-
-def _form(args: argparse.Namespace) -> Form | None:
-    """The form of the given type, else of the wire table's row; None if only a subscriber can determine it."""
-    args.value = "{}" if args.value is None else args.value
-    if args.value == "-":
-        args.value = sys.stdin.read(values.LARGEST + 1)
-    row = wire.topic(args.key)
-    if not args.type:
-        return Form(args, row.type_names) if row else None
-    try:
-        form = Form(args, [args.type])
-    except ValueError as error:
-        raise Failure(f"{args.key}: {error}") from None
-    if row and form.kind.name not in row.type_names and not args.force:
-        raise Failure(f"{args.key}: its type is {' or '.join(row.type_names)}, not {args.type}{FORCE}")
-    return form
-
-
-def _form_of_listener(found: list[Endpoint], args: argparse.Namespace) -> Form:
-    """The form of the type that the key's subscribers expect: a robot's file may give its topics any name."""
-    wanted = {end.type for end in on_key(found, args.key, "sub")}
-    if row := next((row for row in wire.TOPICS if wanted.intersection(row.type_names)), None):
-        return Form(args, row.type_names)
-    for name in sorted(wanted):
-        with contextlib.suppress(ValueError):
-            return Form(args, [name])
-    known = [topic.key for topic in wire.TOPICS]
-    robot = args.key[: args.key.rfind("/") + 1]
-    near = suggest(args.key, [*(f"{robot}{key}" for key in known), *(end.key for end in found if end.kind == "sub")])
-    raise Failure(
-        f"{args.key!r} has no known type{near}; known keys: {', '.join(known)}, each also as ROBOT/key;"
-        f" for any other give the type: holozen topic pub {args.key} geometry_msgs/msg/Twist VALUE"
+    report(
+        f"{key}: no controller reads it, only {listed(end.node for end in ends)}; `{command}` "
+        "drives there"
     )
-
-
-def _payload(form: Form, args: argparse.Namespace) -> bytes:
-    try:
-        return b"" if args.stdin else form.payload(args.value)
-    except ValueError as error:
-        raise Failure(f"{args.key}: refused: {error}") from None
+    return True
 
 
 def _matched(
@@ -156,14 +277,17 @@ def _matched(
     stop: threading.Event,
     looking: Callable[[], list[Endpoint]],
 ) -> int:
-    """Wait for subscribers and return their number. Foreign nodes only show that there are any, and count as one."""
+    """Wait for subscribers and return their number. Foreign nodes only show that there are any, and
+    count as one.
+    """
     wanted, deadline = args.wait or 1, args.max_wait and time.monotonic() + args.max_wait
     graph, reported = None, False
     while True:
         while not publisher.matched and (deadline is None or time.monotonic() < deadline):
             if stop.wait(0.002):
                 return 0
-        if len(on_key(ends := looking(), args.key, "sub")) < wanted:  # the first query was too early
+        # the first query was too early
+        if len(on_key(ends := looking(), args.key, "sub")) < wanted:
             graph = graph or bus.graph()
             ends = graph.settled(bus.connected)
         found = subscribers(ends, args.key, publisher.matched)
@@ -175,40 +299,34 @@ def _matched(
             reported = True
 
 
-def _turns(form: Form, payload: bytes, args: argparse.Namespace, stop: threading.Event) -> Iterator[bytes]:
-    """The value, as often as requested, paced by the rate."""
+def _turns(
+    form: Form,
+    payload: bytes,
+    args: argparse.Namespace,
+    stop: threading.Event,
+    pause: Callable[[float], object],
+) -> Iterator[bytes]:
+    """The value, as often as requested, paced by the rate: `pause` waits for so many seconds."""
     row = wire.topic(args.key)
-    period = 1 / (args.rate or (row.rate if row else 0) or 1.0)  # Hz; of goals there is no usual rate
+    # Hz; of goals there is no usual rate
+    period = 1 / (args.rate or (row.rate if row else 0) or 1.0)
     left, due = 1 if args.once else args.times, time.monotonic()
     while not stop.is_set() and left != 0:
         yield payload
-        payload = _payload(form, args) if values.is_time_dependent(args.value) else payload
+        if values.is_time_dependent(args.value):
+            payload = _encoded(form, args)
         left = left and left - 1
         due += period
         if not args.once:  # the last message also lasts one period
-            stop.wait(max(0.0, due - time.monotonic()))
+            pause(max(0.0, due - time.monotonic()))
 
 
 def _lines(form: Form, args: argparse.Namespace, stop: threading.Event) -> Iterator[bytes]:
     """The bytes of each line of standard input, no faster than the rate."""
     lines: queue.Queue[str] = queue.Queue(maxsize=1000)
-    number = sys.stdin.fileno()
-
-    def read() -> None:
-        # Invalid UTF-8 is passed on as text that no form accepts, so that the error names its line.
-        with open(number, encoding="utf-8", errors="surrogateescape", closefd=False) as source:
-            while line := source.readline(values.LARGEST + 1):
-                lines.put(line)
-        lines.put("")
-
-    threading.Thread(target=read, daemon=True).start()
-    at = 0
-    while not stop.is_set():
-        try:
-            line = lines.get(timeout=LOOK)
-        except queue.Empty:
-            continue
-        at += 1
+    threading.Thread(target=_read_lines, args=(sys.stdin.fileno(), lines), daemon=True).start()
+    for number in count(1):
+        line = _next_line(lines, stop)
         if not line:
             return
         if not line.strip():
@@ -216,17 +334,26 @@ def _lines(form: Form, args: argparse.Namespace, stop: threading.Event) -> Itera
         try:
             yield form.payload(line.strip())
         except ValueError as error:
-            raise Failure(f"{args.key}: line {at} refused: {error}") from None
+            raise Failure(f"{args.key}: line {number} refused: {error}") from None
         if args.rate:
             stop.wait(1 / args.rate)
 
 
-def _stop_robot(publisher: RawPublisher, stops: set[bytes]) -> None:
-    """Send each of the `stops` several times, because a congested link may drop some."""
-    for _ in range(STOPS):
-        for payload in stops:
-            publisher.put_bytes(payload)
-        time.sleep(STOP_EVERY)
+def _read_lines(file: int, lines: queue.Queue[str]) -> None:
+    """Put the lines of a file descriptor into a queue, and an empty one at their end."""
+    # Invalid UTF-8 is passed on as text that no form accepts, so that the error names its line.
+    with open(file, encoding="utf-8", errors="surrogateescape", closefd=False) as source:
+        while line := source.readline(values.LARGEST + 1):
+            lines.put(line)
+    lines.put("")
+
+
+def _next_line(lines: queue.Queue[str], stop: threading.Event) -> str | None:
+    """The next line; empty at the end of the input, None once `stop` is set."""
+    while not stop.is_set():
+        with contextlib.suppress(queue.Empty):
+            return lines.get(timeout=STOP_CHECK)
+    return None
 
 
 def command_feedback(bus: Bus, key: str, is_velocity: bool = True) -> CommandFeedback:
@@ -248,7 +375,9 @@ def command_feedback(bus: Bus, key: str, is_velocity: bool = True) -> CommandFee
 
 
 def _status(kind: Interface, sample: Sample) -> Any:
-    """A CommandStatus, defined by `kind`, as an object; a newer sim may send more fields. Raises CodecError."""
+    """A CommandStatus, defined by `kind`, as an object; a newer sim may send more fields. Raises
+    CodecError.
+    """
     if sample.encoding.startswith(WIRES["cdr"]):
         from holozen.messages import cdr
 
@@ -257,84 +386,3 @@ def _status(kind: Interface, sample: Sample) -> Any:
         return as_object(completed(kind, decode(sample.payload, sample.encoding), tolerant=True))
     except InterfaceError as error:
         raise CodecError(str(error)) from None
-
-
-# The value.
-
-
-class Form:
-    """Encodes values as the first of some types that fits: `kind`, once there is one."""
-
-    def __init__(self, args: argparse.Namespace, type_names: Sequence[str]) -> None:
-        """Raises ValueError for an unknown type, with the most similar one."""
-        registry = Registry(dict(args.package))
-        self._kinds = [registry.find(name) for name in type_names]
-        self.kind, self._wire, self._force = self._kinds[0], args.wire, args.force
-        # A package that is given has its own types, whatever their names are here.
-        ours = not any(name.startswith(f"{package}/") for package, _ in args.package for name in type_names)
-        self._key, self._is_command = args.key, ours and wire.is_command(args.key, type_names)
-        self.stops: set[bytes] = set()
-        """The bytes that stop what its payloads move."""
-        self.command: Any = None
-        """The last payload as an object, if it is a command."""
-
-    @property
-    def encoding(self) -> str:
-        """The Encoding of its bytes."""
-        return encoding_of(self._wire, self.kind.name)
-
-    @property
-    def is_velocity(self) -> bool:
-        """Whether it commands a velocity."""
-        return self._is_command and self.kind.name in wire.VELOCITIES
-
-    @property
-    def is_goal(self) -> bool:
-        """Whether it is a goal, to which a controller drives."""
-        return self._is_command and not self.status_key
-
-    @property
-    def status_key(self) -> str:
-        """The key of the status of its commands: for joints and forces that of the robot's cmd_vel; empty for goals."""
-        if self.is_velocity:
-            return f"{self._key}_status"
-        moves = self._is_command and self.kind.name in ("sensor_msgs/msg/JointState", "geometry_msgs/msg/Wrench")
-        return wire.key_for("cmd_vel_status", self._key.rpartition("/")[0]) if moves else ""
-
-    def payload(self, text: str) -> bytes:
-        """The bytes of a written value. Raises ValueError with the reason."""
-        value = self._message(values.plain(text))
-        bad = not_finite(value)
-        if bad and not self._force:
-            raise ValueError(f"{bad} is not a finite number{FORCE}")
-        if self._is_command:
-            command = self.command = as_object(value)
-            if not self._force and (bad := wire.implausible(command, self.kind.name)):
-                raise ValueError(f"{bad}{FORCE}")
-            if (fields := wire.stop(command, self.kind.name)) is not None:
-                self.stops.add(written(self.kind, completed(self.kind, fields), self._wire))
-        return written(self.kind, value, self._wire)
-
-    def _message(self, value: Any) -> dict[str, Any]:
-        """All fields of the first type that fits; the error is that of the type with most of the names."""
-        names = set(value) if isinstance(value, dict) else set()
-        best = max(self._kinds, key=lambda kind: len(names.intersection(field.name for field in kind.fields)))
-        for kind in self._kinds:
-            with contextlib.suppress(InterfaceError):
-                found, self.kind = completed(kind, value), kind
-                return found
-        return completed(best, value)
-
-
-def written(kind: Interface, value: dict[str, Any], wire: str) -> bytes:
-    """The bytes of a message with all its fields, whose numbers need not be finite as for `codec.encode`."""
-    if wire == "cdr":
-        from holozen.messages import cdr
-
-        return cdr.write(kind, value)
-    value = with_mappings(kind, value)
-    if wire == "json":
-        return json.dumps(value, separators=(",", ":")).encode()
-    import msgspec
-
-    return msgspec.msgpack.encode(value)

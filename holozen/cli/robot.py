@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from holozen.bus import Bus
 from holozen.cli.verb import Verb, argument, by_name, no_arguments, open_bus
-from holozen.console import printable, report
+from holozen.console import printable, report, tell
 from holozen.flags import refused
 from holozen.process import deferred_interrupt
 from holozen.suggest import listed
@@ -25,7 +25,9 @@ TILTED = 5.0  # degrees; a robot on a slope or a balancing one has less
 
 
 def list_entities(args: argparse.Namespace) -> int:
-    """Print the name and the pose of each entity in the sims; returns 1 if a sim does not answer."""
+    """Print the name and the pose of each entity in the sims; returns 1 if a sim does not
+    answer.
+    """
     with open_bus(args) as bus:
         with deferred_interrupt():
             from holozen import entities
@@ -52,7 +54,8 @@ def list_entities(args: argparse.Namespace) -> int:
 
 def _where(pose: Pose) -> str:
     at, yaw = pose.position, math.degrees(pose.orientation.yaw())
-    x, y, z, turn = (round(value, 3) + 0.0 for value in (at.x, at.y, at.z, yaw))  # + 0.0: shows -0 as 0
+    # + 0.0: shows -0 as 0
+    x, y, z, turn = (round(value, 3) + 0.0 for value in (at.x, at.y, at.z, yaw))
     return f"x {x:.3f}  y {y:.3f}  z {z:.3f} m  yaw {turn:.1f} deg{_lean(pose)}"
 
 
@@ -77,7 +80,11 @@ def _entities(bus: Bus) -> Iterator[tuple[str, Pose]]:
             return None
 
     names = entities.names(bus)
-    yield from ((name, pose) for name, pose in zip(names, entities.for_each(where, names), strict=True) if pose)
+    yield from (
+        (name, pose)
+        for name, pose in zip(names, entities.for_each(where, names), strict=True)
+        if pose
+    )
 
 
 def delete(args: argparse.Namespace) -> int:
@@ -99,15 +106,17 @@ def delete(args: argparse.Namespace) -> int:
     with open_bus(args) as bus:
         known = entities.names(bus)  # so that without a sim it fails once, not for each name
         for word in args.names:
-            names = (is_pattern(word) and [name for name in known if fnmatchcase(name, word)]) or [word]
+            names = (is_pattern(word) and [name for name in known if fnmatchcase(name, word)]) or [
+                word
+            ]
             for name, reason in zip(names, entities.for_each(remove, names), strict=True):
                 if reason:
                     report(f"holozen delete: {reason}")
                     failed = 1
                 if args.json:
-                    print(json.dumps({"name": name, "deleted": not reason, "reason": reason}))
+                    tell(json.dumps({"name": name, "deleted": not reason, "reason": reason}))
                 elif not reason:
-                    print(f"{name} is deleted")
+                    tell(f"{name} is deleted")
     return failed
 
 
@@ -127,8 +136,19 @@ def _name(text: str) -> str:
 
 NAMES = "names as `holozen list` shows them, or wildcards such as 'bot*'"
 VERBS = by_name(
-    Verb("list", "list the robots and objects in the sim, and where they are", "--json", no_arguments, list_entities,
-        "print name and pose as JSON, one object per line"),
-    Verb("delete", "remove robots or objects from the sim", "Fred",
-        argument("names", nargs="+", type=_name, metavar="NAME", help=NAMES), delete),
-)  # fmt: skip
+    Verb(
+        "list",
+        "list the robots and objects in the sim, and where they are",
+        "--json",
+        no_arguments,
+        list_entities,
+        "print name and pose as JSON, one object per line",
+    ),
+    Verb(
+        "delete",
+        "remove robots or objects from the sim",
+        "Fred",
+        argument("names", nargs="+", type=_name, metavar="NAME", help=NAMES),
+        delete,
+    ),
+)

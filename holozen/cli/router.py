@@ -1,4 +1,6 @@
-"""`holozen router`: a Zenoh router, the meeting point of processes on several machines or in containers."""
+"""`holozen router`: a Zenoh router, the meeting point of processes on several machines or in
+containers.
+"""
 
 import argparse
 import time
@@ -25,24 +27,27 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _has_expired(bus: Bus) -> bool:
-    """Whether the router's certificate has expired. It starts again with a new one, or ends: Zenoh closes all links
-    then, but those that are made again within the same second stay, and nobody else gets in to stop a robot.
+    """Whether the router's certificate has expired. It starts again with a new one, or ends: Zenoh
+    closes all links then, but those that are made again within the same second stay, and nobody
+    else gets in to stop a robot.
     """
     return bus.member is not None and time.time() > bus.member.expires
 
 
 def _members(where: connection.Connection) -> tuple[int, int]:
-    """The version of the list of members. A new list restarts the router: Zenoh reads access rules only at start."""
+    """The version of the list of members. A new list restarts the router: Zenoh reads access rules
+    only at start.
+    """
     if not where.secure:
         return 0, 0
-    from holozen.transport.members import version  # loads cryptography
+    from holozen.transport.authenticator import authenticator
 
     try:
-        return version(where.secure)
+        return authenticator().version(where.secure)
     except OSError:
         return 0, 0
 
 
 VERBS = by_name(
     Verb("router", "run a Zenoh router", "--listen tcp/0.0.0.0:7447", no_arguments, run, json=None),
-)  # fmt: skip
+)

@@ -12,7 +12,6 @@ from holozen import wire
 from holozen.background import background
 from holozen.bus import Bus
 from holozen.cli.hints import suggest_key
-from holozen.cli.output import Hex, Reader, lines
 from holozen.cli.verb import (
     Noun,
     Verb,
@@ -26,6 +25,7 @@ from holozen.cli.verb import (
 )
 from holozen.console import Failure, report
 from holozen.flags import add_packages, key, number
+from holozen.output import Hex, SampleReader, lines
 from holozen.process import deferred_interrupt
 from holozen.suggest import suggest
 from holozen.transport.errors import NoReply
@@ -50,10 +50,13 @@ def call(args: argparse.Namespace) -> int:
         return _call(bus, args, payload, kind)
 
 
-def _request(found: Iterable[Endpoint], args: argparse.Namespace, text: str, given: str) -> tuple[bytes, str]:
+def _request(
+    found: Iterable[Endpoint], args: argparse.Namespace, text: str, given: str
+) -> tuple[bytes, str]:
     """The request that `text` describes, as JSON, and the service's type, empty if unknown.
 
-    `found` are the endpoints of all nodes; `given` is the type on the command line, or empty. Raises Failure.
+    `found` are the endpoints of all nodes; `given` is the type on the command line, or empty.
+    Raises Failure.
     """
     from holozen.cli import values
     from holozen.messages.registry import Registry
@@ -74,7 +77,9 @@ def _request(found: Iterable[Endpoint], args: argparse.Namespace, text: str, giv
 
 
 def _usual(key: str) -> str:
-    """The type of a service that no node has now, by the wire table; empty if that does not have it."""
+    """The type of a service that no node has now, by the wire table; empty if that does not have
+    it.
+    """
     row = wire.service(key)
     return row.type_name if row else ""
 
@@ -86,11 +91,14 @@ def _known(registry: Registry, name: str) -> Interface | None:
         return None
 
 
-def _given(registry: Registry, key: str, name: str, other: Interface | None, announced: str) -> Interface | None:
-    """The definition of the type `name` given on the command line; `other` and `announced` are the definition and the
-    name of the key's own type, if known.
+def _given(
+    registry: Registry, key: str, name: str, other: Interface | None, announced: str
+) -> Interface | None:
+    """The definition of the type `name` given on the command line; `other` and `announced` are the
+    definition and the name of the key's own type, if known.
 
-    If the definition is missing, that of the key's type is used, provided that its name is the same. Raises Failure.
+    If the definition is missing, that of the key's type is used, provided that its name is the
+    same. Raises Failure.
     """
     actual = other.name if other else announced
     try:
@@ -101,10 +109,15 @@ def _given(registry: Registry, key: str, name: str, other: Interface | None, ann
         lost = not registry.places.names(name.partition("/")[0])
         if not (lost and name.rpartition("/")[2] == actual.rpartition("/")[2]):
             raise Failure(f"{key}: {error}{f'; its type is {actual}' if actual else ''}") from None
-        report(f"holozen service call: {error}; until then the request is checked as {actual}, which {key} has")
+        report(
+            f"holozen service call: {error}; until then the request is checked as {actual}, which "
+            f"{key} has"
+        )
         return other
     if not found.request:
-        raise Failure(f"{key}: {name} is a message; a service has a type such as std_srvs/srv/Trigger")
+        raise Failure(
+            f"{key}: {name} is a message; a service has a type such as std_srvs/srv/Trigger"
+        )
     if other and _fields(found) != _fields(other):
         raise Failure(f"{key}: its type is {actual}, not {name}")
     return found
@@ -122,7 +135,7 @@ def _untyped(key: str, servers: list[Endpoint]) -> str:
 
 
 def _call(bus: Bus, args: argparse.Namespace, payload: bytes, kind: str) -> int:
-    reader = Reader(packages=args.package)
+    reader = SampleReader(packages=args.package)
     try:
         _ask(bus, args, payload, reader, kind)
         while args.rate:
@@ -133,10 +146,17 @@ def _call(bus: Bus, args: argparse.Namespace, payload: bytes, kind: str) -> int:
     return 0
 
 
-def _ask(bus: Bus, args: argparse.Namespace, payload: bytes, reader: Reader, kind: str) -> None:
+def _ask(
+    bus: Bus, args: argparse.Namespace, payload: bytes, reader: SampleReader, kind: str
+) -> None:
     reply = call_bytes(bus, args.key, payload, "application/json", args.timeout)[0]
     value = reader.read(reply, bus, kind and f"{kind}_Response")
-    print(json.dumps(value) if args.json else "\n".join([*lines(value), *(["---"] if args.rate else [])]), flush=True)
+    print(
+        json.dumps(value)
+        if args.json
+        else "\n".join([*lines(value), *(["---"] if args.rate else [])]),
+        flush=True,
+    )
     if isinstance(value, Hex):
         report(f"holozen service call: {args.key}: the reply could not be decoded: {reader.why}")
 
@@ -147,19 +167,57 @@ def _call_arguments(parser: argparse.ArgumentParser) -> None:
     add("words", nargs="*", metavar="[TYPE] REQUEST", help="JSON or YAML (default: all zeros)")
     add("--any", action="store_true", help="send the request unchecked if its type is unknown")
     add_packages(parser)
-    add("-r", "--rate", type=number(0.01, 1000, "Hz"), metavar="HZ", help="call again and again, at this rate")
-    add("--timeout", type=number(0.01, 1e6, "s"), default=5.0, metavar="S", help="seconds to wait (default: 5)")
+    add(
+        "-r",
+        "--rate",
+        type=number(0.01, 1000, "Hz"),
+        metavar="HZ",
+        help="call again and again, at this rate",
+    )
+    add(
+        "--timeout",
+        type=number(0.01, 1e6, "s"),
+        default=5.0,
+        metavar="S",
+        help="seconds to wait (default: 5)",
+    )
 
 
 VERBS = by_name(
     Noun("service", "inspect and call services"),
-    Verb("service list", "list the services that nodes offer", "-t", list_arguments("service"),
-        on_node("keys", "list_services")),
-    Verb("service type", "show a service's type", "next_goal", key_argument, on_node("keys", "service_type")),
-    Verb("service find", "find the services of a type", "std_srvs/srv/Trigger",
-        argument("type", help="such as std_srvs/srv/Trigger, or Trigger"), on_node("keys", "find_services")),
-    Verb("service info", "show a service's type and servers", "next_goal", key_argument,
-        on_node("keys", "service_info")),
-    Verb("service call", "call a service and print its reply", """next_goal '{"request_goal": 0}'""",
-        _call_arguments, call),
-)  # fmt: skip
+    Verb(
+        "service list",
+        "list the services that nodes offer",
+        "-t",
+        list_arguments("service"),
+        on_node("keys", "list_services"),
+    ),
+    Verb(
+        "service type",
+        "show a service's type",
+        "next_goal",
+        key_argument,
+        on_node("keys", "service_type"),
+    ),
+    Verb(
+        "service find",
+        "find the services of a type",
+        "std_srvs/srv/Trigger",
+        argument("type", help="such as std_srvs/srv/Trigger, or Trigger"),
+        on_node("keys", "find_services"),
+    ),
+    Verb(
+        "service info",
+        "show a service's type and servers",
+        "next_goal",
+        key_argument,
+        on_node("keys", "service_info"),
+    ),
+    Verb(
+        "service call",
+        "call a service and print its reply",
+        """next_goal '{"request_goal": 0}'""",
+        _call_arguments,
+        call,
+    ),
+)

@@ -15,10 +15,10 @@ from typing import Any
 
 from holozen.bus import Bus
 from holozen.cli.hints import suggest_key
-from holozen.cli.output import Reader
 from holozen.cli.verb import Verb, by_name, open_bus
 from holozen.console import Failure, printable, report
 from holozen.flags import count, key, number
+from holozen.output import SampleReader
 from holozen.process import stop_event
 from holozen.transport.samples import RawSubscriber, Sample, until_closed
 
@@ -41,7 +41,9 @@ def spread(values: list[float]) -> dict[str, float]:
 
 
 def percentile(ordered: list[float], rank: float) -> float:
-    """The smallest of the sorted values that at least `rank` % of them do not exceed (nearest-rank method)."""
+    """The smallest of the sorted values that at least `rank` % of them do not exceed (nearest-rank
+    method).
+    """
     return ordered[max(0, math.ceil(len(ordered) * rank / 100) - 1)]
 
 
@@ -52,15 +54,23 @@ def jitter(values: list[float]) -> float:
 
 
 def lost(numbers: list[tuple[str, int]]) -> int:
-    """The number of samples missing between the first and the last of each source; `numbers` are Sample.number."""
-    seen: dict[str, set[int]] = {}
+    """The number of samples missing between the first and the last of each source; `numbers` are
+    Sample.number, which may begin anew.
+    """
+    runs: list[set[int]] = []
+    newest: dict[str, set[int]] = {}  # the last run of each source
     for source, place in numbers:
-        seen.setdefault(source, set()).add(place)
-    return sum(max(its) - min(its) + 1 - len(its) for its in seen.values())
+        if place == 0 or source not in newest:
+            newest[source] = set()
+            runs.append(newest[source])
+        newest[source].add(place)
+    return sum(max(run) - min(run) + 1 - len(run) for run in runs)
 
 
 class Window:
-    """The last samples of one key: their arrival times (s, monotonic), measured values and sequence numbers."""
+    """The last samples of one key: their arrival times (s, monotonic), measured values and sequence
+    numbers.
+    """
 
     def __init__(self, size: int) -> None:
         self.times: deque[float] = deque(maxlen=size)
@@ -82,8 +92,8 @@ class Window:
 
 
 class Watch:
-    """Listens to the keys of a verb. `measure` returns the value of a sample, None if it has none; `excuse` returns why
-    samples had none, empty if all had one.
+    """Listens to the keys of a verb. `measure` returns the value of a sample, None if it has none;
+    `excuse` returns why samples had none, empty if all had one.
     """
 
     def __init__(
@@ -98,20 +108,28 @@ class Watch:
         self._lock = threading.Lock()
 
     def run(self, bus: Bus, text: Callable[[Report], str]) -> None:
-        """Print reports until interrupted. Raises Failure if there is no first one within --timeout."""
+        """Print reports until interrupted. Raises Failure if there is no first one within
+        --timeout.
+        """
         stop = stop_event()
         for name in self._args.keys:
-            threading.Thread(target=self._listen, args=(bus.subscribe_raw(name),), daemon=True).start()
+            threading.Thread(
+                target=self._listen, args=(bus.subscribe_raw(name),), daemon=True
+            ).start()
         deadline = self._args.timeout and time.monotonic() + self._args.timeout
         keys = ", ".join(self._args.keys)
         many = len(self._args.keys) > 1 or "*" in keys
         near: str | None = None  # looked up once no messages arrive
-        excused = False  # by the last look: at the first one the clock of the stamps may not have come yet
+        # by the last look: at the first one the clock of the stamps may not have come yet
+        excused = False
         while not stop.wait(EVERY):
             reports = self._reports()
             for name, values in reports.items():
                 head = printable(f"{name}: ") if many else ""
-                print(json.dumps({"key": name, **values}) if self._args.json else head + text(values), flush=True)
+                print(
+                    json.dumps({"key": name, **values}) if self._args.json else head + text(values),
+                    flush=True,
+                )
             if reports:
                 if self._args.once:
                     return
@@ -125,7 +143,9 @@ class Watch:
             if near is None:
                 near = suggest_key(bus, self._args.keys)
             if deadline and time.monotonic() > deadline:
-                raise Failure(self._excuse() or f"no messages on {keys} within {self._args.timeout:g} s{near}")
+                raise Failure(
+                    self._excuse() or f"no messages on {keys} within {self._args.timeout:g} s{near}"
+                )
             report(self._excuse() or f"no new messages on {keys}{near}")
 
     def _listen(self, subscriber: RawSubscriber) -> None:
@@ -143,14 +163,20 @@ class Watch:
         """The reports of the keys that had samples since the last call."""
         with self._lock:
             fresh = {name: window for name, window in sorted(self._windows.items()) if window.fresh}
-            reports = {name: self._report(window) | {"lost": window.lost()} for name, window in fresh.items()}
+            reports = {
+                name: self._report(window) | {"lost": window.lost()}
+                for name, window in fresh.items()
+            }
             for window in fresh.values():
                 window.fresh = False
         return {name: report for name, report in reports.items() if len(report) > 1}
 
 
 def watch(
-    args: argparse.Namespace, measure: Measure, report: Callable[[Window], Report], text: Callable[[Report], str]
+    args: argparse.Namespace,
+    measure: Measure,
+    report: Callable[[Window], Report],
+    text: Callable[[Report], str],
 ) -> int:
     """Run a verb that measures each sample by itself."""
     with open_bus(args) as bus:
@@ -179,12 +205,19 @@ def hz(args: argparse.Namespace) -> int:
 
 
 def rate(times: list[float]) -> Report:
-    """The rate in Hz of arrivals at `times` (s), and the spread of their gaps (s). Empty for fewer than two."""
+    """The rate in Hz of arrivals at `times` (s), and the spread of their gaps (s). Empty for fewer
+    than two.
+    """
     gaps = [later - earlier for earlier, later in pairwise(times)]
     if not gaps:
         return {}
     gap = spread(gaps)
-    return {"rate": 1 / gap["mean"] if gap["mean"] else 0.0, **gap, "jitter": jitter(gaps), "window": len(times)}
+    return {
+        "rate": 1 / gap["mean"] if gap["mean"] else 0.0,
+        **gap,
+        "jitter": jitter(gaps),
+        "window": len(times),
+    }
 
 
 def rate_text(report: Report) -> str:
@@ -198,20 +231,28 @@ def bw(args: argparse.Namespace) -> int:
 
 
 def bandwidth(window: Window) -> Report:
-    """The bandwidth in bytes per second, and the spread of the sizes in bytes. Empty for fewer than two messages."""
+    """The bandwidth in bytes per second, and the spread of the sizes in bytes. Empty for fewer than
+    two messages.
+    """
     sizes, times = list(window.values), list(window.times)
     span = times[-1] - times[0]
     if len(sizes) < 2:
         return {}
     average = sum(sizes[1:]) / span if span else 0.0  # the first message only starts the interval
-    return {"bytes_per_second": average, **spread(sizes), "jitter": jitter(sizes), "window": len(sizes)}
+    return {
+        "bytes_per_second": average,
+        **spread(sizes),
+        "jitter": jitter(sizes),
+        "window": len(sizes),
+    }
 
 
 def bandwidth_text(report: Report) -> str:
     """A report in the format of ROS 2, with an extra line."""
     return (
         f"{size(report['bytes_per_second'])}/s from {report['window']} messages\n"
-        f"\tMessage size mean: {size(report['mean'])} min: {size(report['min'])} max: {size(report['max'])}\n"
+        f"\tMessage size mean: {size(report['mean'])} min: {size(report['min'])} max: "
+        f"{size(report['max'])}\n"
         f"\tp50: {size(report['p50'])} p95: {size(report['p95'])} p99: {size(report['p99'])}"
         f" jitter: {size(report['jitter'])}{lost_text(report)}"
     )
@@ -227,7 +268,9 @@ def size(count: float) -> str:
 
 
 class SimClock:
-    """The sim's time, extrapolated from the latest message on its key `clock` and the pace of its time."""
+    """The sim's time, extrapolated from the latest message on its key `clock` and the pace of its
+    time.
+    """
 
     def __init__(self) -> None:
         self._latest: tuple[float, float] | None = None
@@ -249,13 +292,17 @@ class Delays:
     """Measures the age of messages, each by the clock that stamped it."""
 
     def __init__(self, bus: Bus) -> None:
-        self._bus, self._reader, self._sim = bus, Reader(), SimClock()
+        self._bus, self._reader, self._sim = bus, SampleReader(), SimClock()
         self._clock: threading.Thread | None = None
         self.by: set[str] = set()  # the clocks in use
-        self.unstamped = self.clockless = 0  # messages without a stamp, and with one of an unknown clock
+        self.unstamped = self.clockless = (
+            0  # messages without a stamp, and with one of an unknown clock
+        )
 
     def measure(self, sample: Sample, now: float) -> float | None:
-        """The age of a sample in seconds; None if it has no stamp, or its clock is not known yet."""
+        """The age of a sample in seconds; None if it has no stamp, or its clock is not known
+        yet.
+        """
         stamp = stamp_of(self._reader.read(sample, self._bus))
         if stamp is None:
             self.unstamped += 1
@@ -265,7 +312,9 @@ class Delays:
             self.by.add("the wall clock of this machine")
             return wall - stamp
         if self._clock is None:
-            self._clock = threading.Thread(target=self._follow, args=(self._bus.subscribe_raw("clock"),), daemon=True)
+            self._clock = threading.Thread(
+                target=self._follow, args=(self._bus.subscribe_raw("clock"),), daemon=True
+            )
             self._clock.start()
         sim_time = self._sim.time(now)
         if sim_time is None:
@@ -278,7 +327,10 @@ class Delays:
         """Why some messages have no age; empty if all have one."""
         if self.unstamped:
             return f"{self.unstamped} messages have no header.stamp, and so no age"
-        text = f"{self.clockless} messages have stamps by another clock than this machine's, and nothing comes on clock"
+        text = (
+            f"{self.clockless} messages have stamps by another clock than this machine's, and "
+            "nothing comes on clock"
+        )
         return text if self.clockless else ""
 
     def _follow(self, subscriber: RawSubscriber) -> None:
@@ -311,7 +363,12 @@ def delay(args: argparse.Namespace) -> int:
 
         def row(window: Window) -> Report:
             ages = list(window.values)
-            return {**spread(ages), "jitter": jitter(ages), "window": len(ages), "clock": ", ".join(sorted(delays.by))}
+            return {
+                **spread(ages),
+                "jitter": jitter(ages),
+                "window": len(ages),
+                "clock": ", ".join(sorted(delays.by)),
+            }
 
         Watch(args, delays.measure, row, delays.excuse).run(bus, delay_text)
     if delays.unstamped:
@@ -327,16 +384,38 @@ def delay_text(report: Report) -> str:
 def _arguments(parser: argparse.ArgumentParser, size: int = WINDOW) -> None:
     """The flags that these verbs share. `size`: the default number of samples."""
     add = parser.add_argument
-    add("keys", type=key, nargs="+", metavar="KEY", help="keys or key expressions, such as odom or */odom")
+    add(
+        "keys",
+        type=key,
+        nargs="+",
+        metavar="KEY",
+        help="keys or key expressions, such as odom or */odom",
+    )
     text = f"measure the last N messages (default: {size})"
     add("-w", "--window", type=count(2), default=size, metavar="N", help=text)
     add("-1", "--once", action="store_true", help="end after the first report")
-    add("--timeout", type=number(0.01, 1e6, "s"), metavar="S", help="exit code 1 after S seconds without any")
+    add(
+        "--timeout",
+        type=number(0.01, 1e6, "s"),
+        metavar="S",
+        help="exit code 1 after S seconds without any",
+    )
 
 
 VERBS = by_name(
-    Verb("topic hz", "measure the rate of messages, their jitter, and how many are lost", "odom", _arguments, hz),
-    Verb("topic bw", "measure the bandwidth, and the sizes of messages", "odom",
-        partial(_arguments, size=BYTES_WINDOW), bw),
+    Verb(
+        "topic hz",
+        "measure the rate of messages, their jitter, and how many are lost",
+        "odom",
+        _arguments,
+        hz,
+    ),
+    Verb(
+        "topic bw",
+        "measure the bandwidth, and the sizes of messages",
+        "odom",
+        partial(_arguments, size=BYTES_WINDOW),
+        bw,
+    ),
     Verb("topic delay", "measure the age of messages on arrival", "odom", _arguments, delay),
-)  # fmt: skip
+)

@@ -1,4 +1,6 @@
-"""`holozen stop` and `release`: a stopped robot stands still and ignores all commands until it is released."""
+"""`holozen stop` and `release`: a stopped robot stands still and ignores all commands until it is
+released.
+"""
 
 import argparse
 import json
@@ -8,21 +10,24 @@ from typing import TYPE_CHECKING
 from holozen import cli
 from holozen.bus import Bus
 from holozen.cli.verb import Verb, by_name
-from holozen.console import Failure, printable, report
+from holozen.console import Failure, printable, report, tell
 from holozen.flags import number
 from holozen.transport import connection
 from holozen.transport.errors import TIMEOUT, BusError
 from holozen.transport.graph import UNREACHED
 from holozen.transport.samples import Sample
-from holozen.transport.services import Attempts, refusal
+from holozen.transport.services import RepeatedRequest, refusal
 
 if TYPE_CHECKING:
+    from holozen.command.local_stop import LocalStop
     from holozen.messages import CommandStatus
     from holozen.transport.pubsub import Latest
     from holozen.transport.samples import Replies
 
 TOKENS = "@holozen/*/*/srv/std_srvs/srv/Trigger/**/{verb}"
 DONE = {"stop": "is stopped", "release": "is released"}
+BY = "stop@localhost"  # who stops, for robots of this machine
+ROOT = "the robot at the root"
 NOT_STOPPED = "the robot was not stopped"  # as robots reply to a release
 EVERY = 0.002  # s between two polls
 AGAIN = 0.5  # s without an answer until the request is repeated
@@ -35,29 +40,60 @@ NOTICE = 2.0  # s to discover the first robot, and those named on the command li
 def run(args: argparse.Namespace) -> int:
     """Stop or release robots; 0 only if all of them confirmed."""
     where = connection.from_arguments(args)
+    here = _stopped_here(args, where) if args.verb == "stop" else []
     try:
         with Bus(args.verb, where, patience=args.timeout) as bus:
-            orders = Orders(bus, args, cli.began)
+            orders = Orders(bus, args, cli.began, here)
             orders.give()
             connected = bus.connected()
             code = orders.report()
+            silent = "" if orders.found else bus.silent()
     except BusError as error:
-        raise Failure(f"no robot was reached: {error}") from None
+        if not here:
+            raise Failure(f"no robot was reached: {error}") from None
+        report(f"holozen stop: robots elsewhere were not reached: {error}")
+        names = {name for one in here if one.confirmed for name in (one.robot, one.name)}
+        return int(not args.robots or not names.issuperset(name.strip("/") for name in args.robots))
     if not orders.found:
-        reason = f"no robot was found{connection.FORBIDDEN}" if connected else f"no nodes found at {where.where}"
+        reason = (
+            f"no robot was found{connection.FORBIDDEN}"
+            if connected
+            else f"no nodes found at {where.where}"
+        )
+        if silent:
+            raise Failure(f"no robot was reached: {silent}")
         raise Failure(f"{reason}; `holozen list` shows what a sim has, --connect where to look")
     return code
 
 
+def _stopped_here(args: argparse.Namespace, where: connection.Connection) -> "list[LocalStop]":
+    """Stop the robots of this machine, without a network, and print each confirmation."""
+    from holozen.command.local_stop import stop_here  # not loaded by --help
+
+    found = stop_here(where.networks, [name.strip("/") for name in args.robots], BY)
+    for one in found:
+        order = Order(one.robot, "stop", cli.began)
+        order.confirmed, order.message = one.confirmed, one.message
+        if one.confirmed:
+            order.message = f"stopped by {BY}{one.message and '; '}{one.message}"
+        _print(args, order, one.name)
+    return found
+
+
 class Order:
-    """The request to one robot, repeated until every server of its key has confirmed it: two sims may share a key."""
+    """The request to one robot, repeated until every server of its key has confirmed it: two sims
+    may share a key.
+    """
 
     def __init__(self, robot: str, verb: str, began: float) -> None:
         self.robot, self.key, self.confirmed = robot, f"{robot}/{verb}".removeprefix("/"), False
-        self.outdated = False  # whether the robot was stopped after `began` (s), so that it stays stopped
-        self._attempts = Attempts(began) if verb == "release" else None
-        self.discovered = False  # by the token of its service; robots named on the command line are asked before
-        self.servers: set[str] = set()
+        # whether the robot was stopped after `began` (s), so that it stays stopped
+        self.outdated = False
+        self._attempts = RepeatedRequest(began) if verb == "release" else None
+        # by the token of its service; robots named on the command line are asked before
+        self.discovered = False
+        self.servers: set[str] = set()  # their sessions
+        self.here: set[str] = set()  # those that have confirmed without a network
         self.printed = False  # its confirmation
         self.message = ""
         self._replies: Replies | None = None
@@ -65,20 +101,30 @@ class Order:
 
     def look(self, bus: Bus, now: float) -> bool:
         """Send the request or read its replies; returns whether it was confirmed just now."""
-        if self.confirmed and self._good < len(self.servers):  # another sim was discovered since
+        if self.confirmed and self._good < self._needed:  # another sim was discovered since
             self.confirmed, self._replies = False, None
         if self.confirmed or self.outdated or (self._replies is None and now < self._due):
             return False
         if self._replies is None:
             number = self._attempts.number if self._attempts else ""
-            self._replies, self._good = bus.ask_all(self.key, max(AGAIN, bus.took), number=number), 0
+            self._replies, self._good = (
+                bus.ask_all(self.key, max(AGAIN, bus.took), number=number),
+                0,
+            )
         try:
             while reply := self._replies.try_recv():
                 self._read(reply)
         except BusError:  # all have replied
             self._replies, self._due = None, now + PAUSE
-        self.confirmed = self._good >= max(len(self.servers), 1)
+        self.confirmed = self._good >= max(self._needed, 1)
         return self.confirmed
+
+    @property
+    def _needed(self) -> int:
+        """The confirmations to be had over the network: none if all servers have given theirs
+        without it.
+        """
+        return len(self.servers) if self.servers - self.here else 0
 
     def _read(self, reply: Sample | bytes) -> None:
         if isinstance(reply, Sample):
@@ -87,9 +133,8 @@ class Order:
         elif reply != TIMEOUT:
             refused = refusal(reply)
             self.message = str(refused)
-            self.outdated |= bool(refused.fields.get("outdated"))
-            if self._attempts:
-                self._attempts.were_asked(refused)
+            if self._attempts and "beat" in refused.fields:
+                self.outdated |= not self._attempts.were_asked(refused)
 
 
 def _can_be_asked(name: str) -> bool:
@@ -117,18 +162,32 @@ def _read(payload: bytes, encoding: str) -> tuple[bool, str]:
 class Orders:
     """The requests to all robots, or to those that `args` name."""
 
-    def __init__(self, bus: Bus, args: argparse.Namespace, began: float) -> None:
+    def __init__(
+        self, bus: Bus, args: argparse.Namespace, began: float, here: "list[LocalStop]"
+    ) -> None:
         self._bus, self._verb, self._args, self._began = bus, args.verb, args, began
         self._graph = bus.graph(TOKENS.format(verb=args.verb))
         self._wanted = {name.strip("/") for name in args.robots}
         # Those that are named, or else the robot at the root, are asked before they are discovered.
-        self._orders = {name: Order(name, args.verb, began) for name in filter(_can_be_asked, self._wanted or {""})}
+        self._orders = {
+            name: Order(name, args.verb, began)
+            for name in filter(_can_be_asked, self._wanted or {""})
+        }
         self.found: set[str] = set()  # names of robots
         self._status: Latest[CommandStatus] | None = None  # of the robot at the root
         self._root = ""  # the name of the robot at the root, once it is known
+        for one in here:
+            self.found.add(one.robot)
+            if one.confirmed:
+                self._root = self._root or ("" if one.robot else one.name)
+                order = self._orders.setdefault(one.robot, Order(one.robot, args.verb, began))
+                order.confirmed = order.printed = True
+                order.here.add(one.session)
 
     def give(self) -> None:
-        """Send the order to every robot as soon as it is discovered, and print each confirmation."""
+        """Send the order to every robot as soon as it is discovered, and print each
+        confirmation.
+        """
         begin = changed = now = time.monotonic()
         while now - begin < self._args.timeout and not self._is_over(now - begin, now - changed):
             known = self._known()
@@ -147,23 +206,32 @@ class Orders:
 
     def report(self) -> int:
         """Report robots that did not confirm or were not found. Returns the exit code."""
-        late = [order for order in self._orders.values() if order.discovered and not order.confirmed]
-        for order in late + [order for order in self._orders.values() if order.confirmed and not order.printed]:
+        late = [
+            order for order in self._orders.values() if order.discovered and not order.confirmed
+        ]
+        for order in late + [
+            order for order in self._orders.values() if order.confirmed and not order.printed
+        ]:
             self._print(order)
         missing = sorted(self._missing)
         if missing and self.found:
             found = ", ".join(map(self._named, sorted(self.found)))
-            report(f"holozen {self._verb}: there is no robot {', '.join(map(repr, missing))}; there are: {found}")
+            report(
+                f"holozen {self._verb}: there is no robot {', '.join(map(repr, missing))}; there "
+                f"are: {found}"
+            )
         silent = self._report_silent()
-        # The robot at the root answered, but its token is unknown: so may be other robots, which were not asked.
-        hidden = not self._wanted and any(order.confirmed and not order.discovered for order in self._orders.values())
+        hidden = self._has_hidden
         if hidden:
-            report(f"holozen {self._verb}: other robots may not have been discovered{connection.FORBIDDEN}")
+            report(
+                f"holozen {self._verb}: other robots may not have been "
+                f"discovered{connection.FORBIDDEN}"
+            )
         return 1 if late or missing or silent or hidden or not self.found else 0
 
     def _report_silent(self) -> bool:
-        """Report the robots of nodes that others know of, but that do not answer. Returns whether there are any that
-        were to be reached.
+        """Report the robots of nodes that others know of, but that do not answer. Returns whether
+        there are any that were to be reached.
         """
         if not self.found:
             return False
@@ -191,16 +259,29 @@ class Orders:
                 order.servers.add(endpoint.session)
 
     def _find_root(self) -> None:
-        """Learn the name of the robot at the root, which its keys do not hold; it may be one of those to reach."""
-        if self._status is None:  # only now, since the codec takes longer to load than an order takes
+        """Learn the name of the robot at the root, which its keys do not hold; it may be one of
+        those to reach.
+        """
+        # only now, since the codec takes longer to load than an order takes
+        if self._status is None:
             from holozen.messages import CommandStatus
 
             self._status = self._bus.latest("cmd_vel_status", CommandStatus)
         if not self._root and (status := self._status.read()[0]):
             self._root = status.name
-            if self._root in self._wanted:  # of another robot it may be the name too: then both are meant
+            # of another robot it may be the name too: then both are meant
+            if self._root in self._wanted:
                 self._orders.setdefault("", Order("", self._verb, self._began))
                 self._find()
+
+    @property
+    def _has_hidden(self) -> bool:
+        """Whether a robot answered whose token is unknown: so may be other robots, which were not
+        asked.
+        """
+        return not self._wanted and any(
+            order.confirmed and not order.discovered for order in self._orders.values()
+        )
 
     @property
     def _missing(self) -> set[str]:
@@ -212,9 +293,13 @@ class Orders:
         return len(self.found), sum(len(order.servers) for order in self._orders.values())
 
     def _is_over(self, since: float, quiet: float) -> bool:
-        if not all(order.confirmed or order.outdated for order in self._orders.values() if order.discovered):
+        if not all(
+            order.confirmed or order.outdated for order in self._orders.values() if order.discovered
+        ):
             return False
         if not self.found:  # among thousands of tokens, those of robots may come late
+            return False
+        if self._has_hidden:
             return False
         unnamed = self._wanted and "" in self.found and not self._root
         if self._missing or unnamed:
@@ -222,32 +307,49 @@ class Orders:
         return quiet > max(QUIET, self._bus.took)
 
     def _print(self, order: Order) -> None:
-        name, confirmed, message = self._named(order.robot), order.confirmed, order.message
-        if self._args.json:
-            row = {"robot": order.robot or self._root, "verb": self._verb, "confirmed": confirmed, "message": message}
-            return print(json.dumps(row), flush=True)
-        if confirmed:
-            if message == NOT_STOPPED:
-                return print(printable(f"{name} was not stopped"), flush=True)
-            if self._verb == "stop":
-                message = message.partition("; ")[2]  # what follows who stopped it
-            more = f": {message}" if message else ""
-            return print(printable(f"{name} {DONE[self._verb]}{more}"), flush=True)
-        if order.outdated:
-            return report(f"holozen {self._verb}: {name} is not released: {message}")
-        because = f" ({message})" if message else ""
-        risk = "; it may move" if self._verb == "stop" else ""
-        within = f" within {self._args.timeout:g} s" if order.discovered else ""
-        return report(f"holozen {self._verb}: {name} did not confirm{within}{because}{risk}")
+        _print(self._args, order, self._root)
 
     def _named(self, robot: str) -> str:
-        return robot or self._root or "the robot at the root"
+        return robot or self._root or ROOT
+
+
+def _print(args: argparse.Namespace, order: Order, root: str) -> None:
+    """Print what came of an order; `root`: the name of the robot at the root, if it is known."""
+    name, confirmed, message = order.robot or root or ROOT, order.confirmed, order.message
+    if args.json:
+        row = {
+            "robot": order.robot or root,
+            "verb": args.verb,
+            "confirmed": confirmed,
+            "message": message,
+        }
+        return tell(json.dumps(row))
+    if confirmed:
+        if message == NOT_STOPPED:
+            return tell(printable(f"{name} was not stopped"))
+        if args.verb == "stop":
+            message = message.partition("; ")[2]  # what follows who stopped it
+        more = f": {message}" if message else ""
+        return tell(printable(f"{name} {DONE[args.verb]}{more}"))
+    if order.outdated:
+        return report(f"holozen {args.verb}: {name} is not released: {message}")
+    because = f" ({message})" if message else ""
+    risk = "; it may move" if args.verb == "stop" else ""
+    within = f" within {args.timeout:g} s" if order.discovered else ""
+    return report(f"holozen {args.verb}: {name} did not confirm{within}{because}{risk}")
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("robots", nargs="*", metavar="ROBOT", help="its name (default: all robots there are)")
-    parser.add_argument("--timeout", type=number(0.1, 1e6, "s"), default=5.0, metavar="S",
-        help="seconds to connect, and then for every robot to confirm (default: 5)")  # fmt: skip
+    parser.add_argument(
+        "robots", nargs="*", metavar="ROBOT", help="its name (default: all robots there are)"
+    )
+    parser.add_argument(
+        "--timeout",
+        type=number(0.1, 1e6, "s"),
+        default=5.0,
+        metavar="S",
+        help="seconds to connect, and then for every robot to confirm (default: 5)",
+    )
 
 
 VERBS = by_name(

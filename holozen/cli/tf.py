@@ -23,6 +23,7 @@ from holozen.transport.samples import Sample
 
 if TYPE_CHECKING:
     from holozen.messages import TFMessage
+    from holozen.transport.pubsub import Subscription
 
 TICK = 0.01  # s between two polls
 ASK = 0.3  # s to wait for replies with static transforms
@@ -44,9 +45,7 @@ def echo(args: argparse.Namespace) -> int:
         begun, due, shown, warned = time.monotonic(), 0.0, False, False
         while not stop.wait(TICK):
             for reader, static in zip(readers, (False, True), strict=True):
-                while (received := reader.try_recv()) is not None:
-                    if received.message is not None:
-                        frames.take(received.message, static)
+                _take_all(reader, frames, static)
             now = time.monotonic()
             if now < due:
                 continue
@@ -57,7 +56,10 @@ def echo(args: argparse.Namespace) -> int:
                 if args.timeout and passed > args.timeout and not shown:
                     raise Failure(_why(bus, keys[0], frames, error)) from None
                 if passed > WAITING and not (warned or args.timeout):
-                    report(f"waiting for {args.source} -> {args.target}; {_why(bus, keys[0], frames, error)}")
+                    report(
+                        f"waiting for {args.source} -> {args.target}; "
+                        f"{_why(bus, keys[0], frames, error)}"
+                    )
                     warned = True
                 continue
             _print(args, pose, stamp)
@@ -65,6 +67,13 @@ def echo(args: argparse.Namespace) -> int:
                 return 0
             due, shown = now + 1 / args.rate, True
     return 0
+
+
+def _take_all(reader: Subscription[TFMessage], frames: Frames, static: bool) -> None:
+    """Take in the messages that wait."""
+    while (received := reader.try_recv()) is not None:
+        if received.message is not None:
+            frames.take(received.message, static)
 
 
 def _held(bus: Bus, key: str) -> Iterable[TFMessage]:
@@ -83,11 +92,19 @@ def _held(bus: Bus, key: str) -> Iterable[TFMessage]:
 def _why(bus: Bus, key: str, frames: Frames, error: LookupError) -> str:
     if not bus.connected():
         return f"no transforms on {key}; {no_nodes(bus.where)}"
-    others = {end.key.rpartition("/")[0] for end in bus.endpoints() if end.kind == "pub" and _TF.match(end.key)}
+    others = {
+        end.key.rpartition("/")[0]
+        for end in bus.endpoints()
+        if end.kind == "pub" and _TF.match(end.key)
+    }
     flags = ["without --robot"] if "" in others and key != "tf" else []
     if named := others - {"", key.rpartition("/")[0]}:
         flags.append(f"with --robot {listed(named)}")
-    hint = f"; there are {'others' if frames.names() else 'some'} {' and '.join(flags)}" if flags else ""
+    hint = (
+        f"; there are {'others' if frames.names() else 'some'} {' and '.join(flags)}"
+        if flags
+        else ""
+    )
     return f"{error if frames.names() else f'no transforms on {key}'}{hint}"
 
 
@@ -109,7 +126,9 @@ def _print(args: argparse.Namespace, pose: Transform, stamp: float) -> None:
 
 
 def _listed(values: Iterable[float]) -> str:
-    return f"[{', '.join(f'{round(value, 3) + 0.0:.3f}' for value in values)}]"  # + 0.0: never -0.000
+    return (
+        f"[{', '.join(f'{round(value, 3) + 0.0:.3f}' for value in values)}]"  # + 0.0: never -0.000
+    )
 
 
 def _frame(text: str) -> str:
@@ -118,13 +137,40 @@ def _frame(text: str) -> str:
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("source", type=_frame, metavar="SOURCE", help="the frame in which the pose is given, such as odom")
-    add("target", type=_frame, metavar="TARGET", help="the frame whose pose it is, such as base_link")
-    add("--robot", type=robot, default="", metavar="NAME",
-        help="the robot whose keys to use (default: those at the root)")  # fmt: skip
-    add("-r", "--rate", type=number(0.01, 100, "Hz"), default=1.0, metavar="HZ", help="poses per second (default: 1)")
+    add(
+        "source",
+        type=_frame,
+        metavar="SOURCE",
+        help="the frame in which the pose is given, such as odom",
+    )
+    add(
+        "target",
+        type=_frame,
+        metavar="TARGET",
+        help="the frame whose pose it is, such as base_link",
+    )
+    add(
+        "--robot",
+        type=robot,
+        default="",
+        metavar="NAME",
+        help="the robot whose keys to use (default: those at the root)",
+    )
+    add(
+        "-r",
+        "--rate",
+        type=number(0.01, 100, "Hz"),
+        default=1.0,
+        metavar="HZ",
+        help="poses per second (default: 1)",
+    )
     add("-1", "--once", action="store_true", help="end after the first one")
-    add("--timeout", type=number(0.01, 1e6, "s"), metavar="S", help="exit code 1 after S seconds without one")
+    add(
+        "--timeout",
+        type=number(0.01, 1e6, "s"),
+        metavar="S",
+        help="exit code 1 after S seconds without one",
+    )
 
 
 VERBS = by_name(

@@ -2,25 +2,26 @@
 
 import argparse
 import contextlib
+import io
 import os
 import signal
 import subprocess
 import sys
-import tempfile
 import termios
 import threading
 import time
 from typing import IO, TYPE_CHECKING, Any
 
-from holozen import flags
+from holozen import engines, flags
 from holozen.cli import command
+from holozen.cli.table import ROUTER
 from holozen.cli.verb import Verb, by_name
-from holozen.console import report
+from holozen.console import Failure, report
 from holozen.process import dies_with_parent, stop_event
 from holozen.suspension import suspend_children_too
+from holozen.system import memory_file
 from holozen.transport import connection
-from holozen.transport.rendezvous import is_taken
-from holozen.transport.roles import ROUTER
+from holozen.transport.loopback import is_taken
 from holozen.wire import resume_command
 
 if TYPE_CHECKING:
@@ -30,9 +31,11 @@ GRACE = 1.2  # s for the commanding processes to stop the robot; the sim ends af
 SIM_GRACE = 0.5  # s
 LOOK = 0.05  # s
 SETTLED = 10.0  # s; a part that fails sooner at its first start has a wrong flag or file
-PAUSES = 0.5, 30.0  # s before a part is started again: the first, doubled until it settles, and the longest
+# s before a part is started again: the first, doubled until it settles, and the longest
+PAUSES = (0.5, 30.0)
 LAST_LINES = 20
-# Plain keys, no synchronized update, line wrapping, no reports of focus and pastes, a visible cursor, the main screen.
+# Plain keys, no synchronized update, line wrapping, no reports of focus and pastes, a visible
+# cursor, the main screen.
 SCREEN_LEFT = "\x1b[<u\x1b[?2026l\x1b[?7h\x1b[?1004l\x1b[?2004l\x1b[?25h\x1b[?1049l"
 
 
@@ -42,34 +45,47 @@ def run(args: argparse.Namespace) -> int:
         args.error("--shards gives each robot to the shard of its name: use --robot FILE=NAME")
     has_terminal = sys.stdin.isatty() and sys.stdout.isatty()
     parts = _parts(args, has_terminal)
+    engine = engines.choose(args.engine)
+    _read_files(args)
     where, router = _meeting(connection.from_arguments(args))
     stop = stop_event()
     suspend_children_too()
     if "teleop" in parts and args.view is not None and (where.private or where.secure):
         # The teleop's screen would hide it, and other users can see the arguments of a process.
-        args.error("--view cannot show the token of its page beside the teleop: run `holozen view` in another terminal")
+        args.error(
+            "--view cannot show the token of its page beside the teleop: run `holozen view` in "
+            "another terminal"
+        )
     if not has_terminal:
         report("up: no terminal here, so no teleop; the rest runs until Ctrl-C or SIGTERM")
+    elif args.engine == flags.AUTO:  # the sim says it too, where the teleop's screen hides it
+        report(f"up: the engine is {engine}")
     terminal = termios.tcgetattr(sys.stdin) if has_terminal else []
-    with tempfile.TemporaryFile("w+", errors="replace") as log:
-        team = Team(where.arguments(), log if has_terminal else None, not args.no_restart, _name(args))
+    with _log() if has_terminal else contextlib.nullcontext() as log:
+        team = Team(where.arguments(), log, not args.no_restart, _name(args))
         try:
             for part, words in (({ROUTER: router} if router else {}) | parts).items():
                 team.start(part, words)
             failed = team.watch(stop)
         finally:
             team.end()
-            if has_terminal:
+            if log:
                 _restore(terminal)
-            _report_last(log)
+                _report_last(log)
     return 1 if failed else 0
 
 
 def _parts(args: argparse.Namespace, has_terminal: bool) -> dict[str, list[str]]:
     """The parts to start and their arguments. Exits with code 2 if a part would refuse one."""
-    robots = [word for robot in args.robot for word in ("--robot", "=".join(filter(None, map(str, robot))))]
+    robots = [
+        word
+        for robot in args.robot
+        for word in ("--robot", "=".join(filter(None, map(str, robot))))
+    ]
     name = list(filter(None, [_name(args)]))
-    sources = [word for package, folder in args.package for word in ("--package", f"{package}={folder}")]
+    sources = [
+        word for package, folder in args.package for word in ("--package", f"{package}={folder}")
+    ]
     sources += [word for variable in args.allow_env for word in ("--allow-env", variable)]
     pace, goals = _flags(args, "rtf"), _flags(args, "shape", "size", "goals")
     for verb, words in (("sim", pace), ("pose-service", goals)):
@@ -79,7 +95,11 @@ def _parts(args: argparse.Namespace, has_terminal: bool) -> dict[str, list[str]]
             parser.parse_args(words)
     sim = [*robots, *sources, *pace, *_flags(args, "world", "drive", "engine"), *_state(args.state)]
     shards = [f"{shard}/{args.shards}" for shard in range(1, args.shards + 1)]
-    parts = {f"sim {shard}": [*sim, "--shard", shard] for shard in shards} if args.shards > 1 else {"sim": sim}
+    parts = (
+        {f"sim {shard}": [*sim, "--shard", shard] for shard in shards}
+        if args.shards > 1
+        else {"sim": sim}
+    )
     driven = args.shards == 1 or args.robot  # else there is no robot yet
     if driven:
         parts |= {"pose-service": goals, "controller": [*name, "--laps", str(args.laps)]}
@@ -90,16 +110,49 @@ def _parts(args: argparse.Namespace, has_terminal: bool) -> dict[str, list[str]]
     return parts
 
 
+def _read_files(args: argparse.Namespace) -> None:
+    """Read the files that parts are given, so that none starts beside one that cannot. Raises
+    Failure.
+    """
+    if args.goals:
+        try:
+            command("pose-service").read_goals(args.goals)
+        except ValueError as error:
+            raise Failure(str(error)) from None
+    if not (args.world or args.robot):
+        return
+    from holozen.robot.errors import RobotError
+    from holozen.robot.files import loading, reader
+    from holozen.robot.files.sdf_world import load_world
+
+    reader.start(loading)
+    try:
+        if args.world:
+            load_world(args.world, dict(args.package))
+        for path, _ in args.robot:
+            loading.load(path, packages=dict(args.package), allow_env=args.allow_env)
+    except RobotError as error:
+        raise Failure(str(error)) from None
+    finally:
+        reader.server.close()
+
+
 def _name(args: argparse.Namespace) -> str:
     """The name of the robot that the controller drives; empty for the one at the root."""
     return (args.robot and args.robot[0][1]) or ""
 
 
 def _meeting(where: connection.Connection) -> tuple[connection.Connection, list[str]]:
-    """The connection of the parts, and the flags of a router for them; empty if they need none, or one runs."""
-    if not where.secure or where.connect is not None or not os.path.isdir(os.path.join(where.secure, ROUTER)):
+    """The connection of the parts, and the flags of a router for them; empty if they need none, or
+    one runs.
+    """
+    if (
+        not where.secure
+        or where.connect is not None
+        or not os.path.isdir(os.path.join(where.secure, ROUTER))
+    ):
         return where, []
-    listen = where.listen or where.meeting_points
+    listen = where.listen or (where.address,)
     clients = where._replace(listen=None, connect=(connection.from_here(listen[0]),))
     if is_taken(listen[0]):
         report(f"up: something listens at {listen[0]} already; assuming that it is the router")
@@ -108,29 +161,41 @@ def _meeting(where: connection.Connection) -> tuple[connection.Connection, list[
 
 
 class Team:
-    """The processes of one `up`. Their output goes to `log`, or to that of this process if it is None.
+    """The processes of one `up`. Their output goes to `log`, or to that of this process if it is
+    None.
 
-    If it `restarts`, a part that dies is started again in a way that moves no robot: the robots of a new sim are
-    stopped until `holozen release`, and a new controller drives only after a resume. A new pose service would let a
-    waiting controller drive on, so the controller is replaced too.
+    If it `restarts`, a part that dies is started again in a way that moves no robot: the robots of
+    a new sim are stopped until `holozen release`, and a new controller drives only after a resume.
+    A new pose service would let a waiting controller drive on, so the controller is replaced too.
     """
 
-    def __init__(self, where: list[str], log: IO[str] | None, restarts: bool, robot: str = "") -> None:
+    def __init__(
+        self, where: list[str], log: IO[str] | None, restarts: bool, robot: str = ""
+    ) -> None:
         self._where, self._log, self._restarts, self._robot = where, log, restarts, robot
         self._running: dict[str, subprocess.Popen[bytes]] = {}
         self._words: dict[str, list[str]] = {}
-        self._started: dict[str, float] = {}  # s; in the future for a part that is to be started again
-        self._pause: dict[str, float] = {}  # s before the last restart of each part that was restarted
+        # s; in the future for a part that is to be started again
+        self._started: dict[str, float] = {}
+        # s before the last restart of each part that was restarted
+        self._pause: dict[str, float] = {}
 
     def start(self, verb: str, words: list[str]) -> None:
-        """Start a part, called by its verb, or `sim K/N`. The teleop keeps the terminal, and the others get no signals
-        from it.
+        """Start a part, called by its verb, or `sim K/N`. The teleop keeps the terminal, and the
+        others get no signals from it.
         """
         in_terminal = verb == "teleop"
         self._words.setdefault(verb, words)
         self._started[verb] = time.monotonic()
         self._running[verb] = subprocess.Popen(
-            [sys.executable, "-m", "holozen", _verb(verb), *words, *([] if verb == ROUTER else self._where)],
+            [
+                sys.executable,
+                "-m",
+                "holozen",
+                _verb(verb),
+                *words,
+                *([] if verb == ROUTER else self._where),
+            ],
             stdin=None if in_terminal else subprocess.DEVNULL,
             stdout=None if in_terminal else self._log,
             stderr=None if in_terminal else self._log,
@@ -139,8 +204,8 @@ class Team:
         )
 
     def watch(self, stop: threading.Event) -> bool:
-        """Wait until `stop` is set, the teleop was quit, a part failed for good, or all ended. Returns whether one
-        failed.
+        """Wait until `stop` is set, the teleop was quit, a part failed for good, or all ended.
+        Returns whether one failed.
         """
         while self._started and not stop.wait(LOOK):
             for verb in list(self._started):
@@ -153,7 +218,9 @@ class Team:
         return False
 
     def _ended(self, verb: str, code: int) -> bool:
-        """Report the end of a part, and schedule its restart if it died. Returns whether the others go on."""
+        """Report the end of a part, and schedule its restart if it died. Returns whether the others
+        go on.
+        """
         del self._running[verb]
         lived = time.monotonic() - self._started.pop(verb)
         if verb == "teleop":
@@ -170,7 +237,9 @@ class Team:
             return True
         pause = self._pause.get(verb, 0.0) if lived < SETTLED else 0.0
         self._pause[verb] = pause = min(max(PAUSES[0], 2 * pause), PAUSES[1])
-        self._report(f"up: {verb} {_how(code)}; starting it again in {pause:g} s{_after(verb, self._robot)}")
+        self._report(
+            f"up: {verb} {_how(code)}; starting it again in {pause:g} s{_after(verb, self._robot)}"
+        )
         again = [verb]
         if verb == "pose-service" and "controller" in self._running:
             _end({"controller": self._running.pop("controller")}, GRACE)
@@ -186,8 +255,12 @@ class Team:
             report(text)
 
     def end(self) -> None:
-        """End the processes: first those that command the robot, then the sims, then the router between them."""
-        sims = {verb: self._running.pop(verb) for verb in list(self._running) if _verb(verb) == "sim"}
+        """End the processes: first those that command the robot, then the sims, then the router
+        between them.
+        """
+        sims = {
+            verb: self._running.pop(verb) for verb in list(self._running) if _verb(verb) == "sim"
+        }
         router = {verb: self._running.pop(verb) for verb in (ROUTER,) if verb in self._running}
         for parts, grace in ((self._running, GRACE), (sims, SIM_GRACE), (router, SIM_GRACE)):
             _end(parts, grace)
@@ -235,7 +308,12 @@ def _end(running: dict[str, subprocess.Popen[bytes]], grace: float) -> None:
 
 
 def _flags(args: argparse.Namespace, *names: str) -> list[str]:
-    return [word for name in names if getattr(args, name) for word in (f"--{name}", str(getattr(args, name)))]
+    return [
+        word
+        for name in names
+        if getattr(args, name)
+        for word in (f"--{name}", str(getattr(args, name)))
+    ]
 
 
 def _state(given: str | None) -> list[str]:
@@ -253,6 +331,13 @@ def _restore(terminal: list[Any]) -> None:
         print(SCREEN_LEFT, end="", flush=True)
 
 
+def _log() -> IO[str]:
+    """A file for what parts report while the teleop has the screen: in memory, since a root that is
+    read-only has no place for it.
+    """
+    return io.TextIOWrapper(memory_file("up"), errors="replace")
+
+
 def _report_last(log: IO[str]) -> None:
     log.seek(0)
     for line in log.readlines()[-LAST_LINES:]:
@@ -266,32 +351,78 @@ def _robot(text: str) -> "tuple[Path, str]":
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("--robot", type=_robot, action="append", default=[], metavar="FILE[=NAME]",
-        help="a xacro or URDF file, and the robot's name (default: hb_bot, with its keys at the root);"
-        " of several the controller drives the first")  # fmt: skip
+    add(
+        "--robot",
+        type=_robot,
+        action="append",
+        default=[],
+        metavar="FILE[=NAME]",
+        help="a xacro or URDF file, and the robot's name (default: hb_bot, with its keys at the "
+        "root);"
+        " of several the controller drives the first",
+    )
     add("--name", "-model", "-entity", action=flags.Instead, advice=flags.NAMED)
     add("--world", type=flags.file, metavar="FILE", help="an SDF file (default: gazebo.world)")
-    add("--rtf", metavar="FACTOR", help="real-time factor; 0: as fast as possible (default: the world's)")
+    add(
+        "--rtf",
+        metavar="FACTOR",
+        help="real-time factor; 0: as fast as possible (default: the world's)",
+    )
     add("--drive", choices=flags.DRIVES, help=flags.DRIVE)
-    add("--engine", choices=flags.ENGINES, help=flags.ENGINE)
+    add("--engine", choices=(flags.AUTO, *flags.ENGINES), default=flags.AUTO, help=flags.ENGINE)
     flags.add_robot_sources(parser)
-    add("--shape", metavar="SHAPE",
-        help="shape of the goals: square, triangle, rectangle, infinity or hexagon (default: square)")  # fmt: skip
-    add("--size", metavar="M", help="side length of the shape in metres (for infinity: half its length)")
-    add("--goals", type=flags.file, metavar="FILE", help="goals from a file instead: x y theta per line")
-    add("--laps", type=flags.count(), metavar="N", default=0,
-        help="number of laps around the goals; 0: for ever (default: 0)")  # fmt: skip
-    add("--view", nargs="?", type=flags.port, const=8080, metavar="PORT",
-        help="show the robots in a browser too, at http://127.0.0.1:8080/ or another port (0: a free one)")  # fmt: skip
-    add("--shards", type=flags.count(1), default=1, metavar="N",
-        help="run N sims and divide the robots among them by name (default: 1)")  # fmt: skip
-    add("--state", metavar="DIR",
-        help="folder where software stops are kept (default: HOLOZEN_STATE, else ~/.local/state/holozen)")  # fmt: skip
+    add(
+        "--shape",
+        metavar="SHAPE",
+        help="shape of the goals: square, triangle, rectangle, infinity or hexagon (default: "
+        "square)",
+    )
+    add(
+        "--size",
+        metavar="M",
+        help="side length of the shape in metres (for infinity: half its length)",
+    )
+    add(
+        "--goals",
+        type=flags.file,
+        metavar="FILE",
+        help="goals from a file instead: x y theta per line",
+    )
+    add(
+        "--laps",
+        type=flags.count(),
+        metavar="N",
+        default=0,
+        help="number of laps around the goals; 0: for ever (default: 0)",
+    )
+    add(
+        "--view",
+        nargs="?",
+        type=flags.port,
+        const=8080,
+        metavar="PORT",
+        help="show the robots in a browser too, at http://127.0.0.1:8080/ or another port (0: a "
+        "free one)",
+    )
+    add(
+        "--shards",
+        type=flags.count(1),
+        default=1,
+        metavar="N",
+        help="run N sims and divide the robots among them by name (default: 1)",
+    )
+    add(
+        "--state",
+        metavar="DIR",
+        help="folder where software stops are kept (default: HOLOZEN_STATE, else "
+        "~/.local/state/holozen)",
+    )
     add("--no-restart", action="store_true", help="do not restart parts that die")
 
 
 ABOUT = (
-    "start the sim, the controller, the pose service, and the teleop if there is a terminal; with --secure a router"
+    "start the sim, the controller, the pose service, and the teleop if there is a terminal; with "
+    "--secure a router"
     " too, unless --connect names one"
 )
 VERBS = by_name(Verb("up", ABOUT, "--robot my_bot.urdf.xacro", _arguments, run, json=None))

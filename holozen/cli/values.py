@@ -35,8 +35,9 @@ def plain(text: str) -> Any:
 
 
 def checked(text: str, kind: Interface) -> dict[str, Any]:
-    """The fields that `text` gives a message of a type. Omitted ones are not added: a node of another version may not
-    know them. Raises ValueError for fields that do not fit the type, and for numbers that are not finite.
+    """The fields that `text` gives a message of a type. Omitted ones are not added: a node of
+    another version may not know them. Raises ValueError for fields that do not fit the type, and
+    for numbers that are not finite.
     """
     from holozen.messages.definitions import completed
 
@@ -48,7 +49,9 @@ def checked(text: str, kind: Interface) -> dict[str, Any]:
 
 
 def is_time_dependent(text: str) -> bool:
-    """Whether a value may have `header: auto` or `stamp: now`, for which each message needs the time anew."""
+    """Whether a value may have `header: auto` or `stamp: now`, for which each message needs the
+    time anew.
+    """
     return "auto" in text or "now" in text
 
 
@@ -72,7 +75,9 @@ def _double(names: list[str]) -> str | None:
 
 
 def _timed(value: Any) -> Any:
-    """A value with `header: auto` and `stamp: now` replaced by the current time, as in `ros2 topic pub`."""
+    """A value with `header: auto` and `stamp: now` replaced by the current time, as in `ros2 topic
+    pub`.
+    """
     if isinstance(value, list):
         return [_timed(inner) for inner in value]
     if not isinstance(value, dict):
@@ -81,7 +86,9 @@ def _timed(value: Any) -> Any:
     stamp = {"sec": sec, "nanosec": nanosec}
     filled = {("header", "auto"): {"stamp": stamp}, ("stamp", "now"): stamp}
     return {
-        name: filled[name, inner] if isinstance(inner, str) and (name, inner) in filled else _timed(inner)
+        name: filled[name, inner]
+        if isinstance(inner, str) and (name, inner) in filled
+        else _timed(inner)
         for name, inner in value.items()
     }
 
@@ -90,23 +97,29 @@ def _yaml(text: str, why_no_json: ValueError) -> Any:
     try:
         import yaml
     except ModuleNotFoundError:
-        raise ValueError(f"{cut(text)} is not valid JSON: {why_no_json}; to write YAML: pip install pyyaml") from None
+        raise ValueError(
+            f"{cut(text)} is not valid JSON: {why_no_json}; to write YAML: pip install pyyaml"
+        ) from None
 
     class Loader(yaml.SafeLoader):
-        """Reads numbers as YAML 1.2 and JSON do: 1e-3 is one, without a decimal point. Refuses a name that is given
-        twice.
+        """Reads numbers as YAML 1.2 and JSON do: 1e-3 is one, without a decimal point. Refuses a
+        name that is given twice.
         """
 
         def construct_mapping(self, node: Any, deep: bool = False) -> Any:
             double = _double([name.value for name, _ in node.value if isinstance(name.value, str)])
             if double is not None:
-                raise yaml.constructor.ConstructorError(None, None, f"{cut(double)} is given twice", node.start_mark)
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"{cut(double)} is given twice", node.start_mark
+                )
             return super().construct_mapping(node, deep)
 
     def number(loader: Loader, node: Any) -> Any:
         if ODD_NUMBER.match(node.value):
             return node.value
-        read = loader.construct_yaml_int if node.tag.endswith(":int") else loader.construct_yaml_float
+        read = (
+            loader.construct_yaml_int if node.tag.endswith(":int") else loader.construct_yaml_float
+        )
         return read(node)
 
     for kind in ("int", "float"):

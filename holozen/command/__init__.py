@@ -1,1 +1,3 @@
-"""cmd_vel, joint_command, forces -> the motion of a robot: fresh, within limits, from the source that drives."""
+"""cmd_vel, joint_command, forces -> the motion of a robot: fresh, within limits, from the source
+that drives.
+"""

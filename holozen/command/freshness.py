@@ -1,239 +1,292 @@
-"""How old a command is, and whether its sender is still alive. No clock, no socket.
+"""How old a command is, by its echo, and whether its sender is still alive. No clock, no socket.
 
-The time of arrival does not show the age: TCP delivers buffered data seconds later, even for a process that has died.
+The time of arrival does not show the age: TCP delivers buffered data seconds later, even of a
+process that has died. So the receiver publishes its own time, its beat, and a command carries the
+newest beat that its sender had heard, its echo: the command was sent after that beat.
 """
 
 from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
+from holozen.command.arbiter import Arbiter, Sent
+from holozen.command.outcome import Decision, Outcome, refusal
 from holozen.messages import Message
-from holozen.transport.peer_clocks import PROMPT
 from holozen.transport.pubsub import Received
-from holozen.transport.samples import Stamp
+from holozen.transport.samples import Echo, Stamp
 from holozen.wire import COMMAND_SILENCE
 
 M = TypeVar("M", bound=Message)
+K = TypeVar("K", bound=Hashable)
 T = TypeVar("T")
 
-MAX_WAITING = 32  # commands from senders whose clock is not known yet
-MAX_KNOWN = 256  # senders; beyond, the one that has not commanded for the longest time is forgotten
+# s; three beats: what is older may have been held up, and its sender may have died since
+BEGIN_AGE = 0.15
+# streams or speakers; beyond, the one that has not commanded for the longest time is forgotten
+MAX_KNOWN = 256
 AGES = (0.05, COMMAND_SILENCE)  # s; the range of `max_age`
 
-OLD = "old: it was sent up to {age:.2f} s ago; at most {limit:g} s"
-GONE = "gone: its sender has left"
-OUT_OF_ORDER = "out of order: number {number} came after {last}"
-UNANSWERED = "late: it was under way for {age:.2f} s or more, and its sender has not answered since"
-UNKNOWN = "unknown clock: its sender has not answered with its time"
-VOID = "void: it came before the sim was played or reset"
-UNSTAMPED = "unstamped: this sender stamps its commands"
+OLD = "it was sent up to {age:.2f} s ago; at most {limit:g} s"
+WAITED = "it waited up to {age:.1f} s for this process; at most {limit:g} s"
+GONE = "its sender has left, or is not known yet"
+OUT_OF_ORDER = "number {number} came after {last}"
+HELD_UP = "it was sent up to {age:.2f} s ago, too long to begin with; send another"
+NO_ECHO = "its sender has not heard this robot yet; send another"
+UNSTAMPED = "this sender stamps its commands"
 
 
 class Senders(Protocol):
-    """What the receiver knows about the senders' sessions. Times in s of its own monotonic clock."""
+    """What the receiver knows about the senders' sessions."""
 
     def has(self, session: str) -> bool:
         """Whether the session holds a liveliness token."""
         ...
 
-    def ages(self, session: str, sent: float, now: float, member: str) -> tuple[float, float] | None:
-        """The least and the greatest age (s) of a sample that the session sent at `sent`, by the sender's clock. None
-        while they are unknown, and in the secure set-up if the session is not that of `member`.
+    def echo(self, echoes: tuple[Echo, ...]) -> int | None:
+        """This receiver's beat that is among the echoes, in ns of its own time; None if none of its
+        beats is.
         """
         ...
 
-    def track_first(self, session: str, now: float) -> None:
-        """Measure the clock of this session before those of others."""
+    def age(self, beat: int, now: float) -> float:
+        """The time in s from a beat of this receiver to `now` (s)."""
         ...
 
-    def answered(self, session: str) -> float:
-        """When the last clock request that the session answered was sent; below zero before the first answer."""
-        ...
-
-    def ask_now(self, session: str, now: float) -> None:
-        """Measure the clock of this session again at once."""
+    def beat_now(self) -> None:
+        """Send a beat after an event, so that commands can tell that they were sent after it."""
         ...
 
 
-class Sender(NamedTuple):
-    """One sequence of commands: those of a `session`, or of a named sender without stamps, on one key and priority."""
+class Stream(NamedTuple):
+    """The stamped commands of a session on one key and priority: each echoes a newer beat, or has a
+    higher number.
+    """
 
     session: str
     priority: str
     key: str
 
 
+class Speaker(NamedTuple):
+    """A source on a key, whatever its priorities and with or without stamps: its numbers are one
+    sequence.
+    """
+
+    source: str
+    key: str
+
+
+class Heard(NamedTuple):
+    """The last command that was heard of a source on a key: its number, if it has one, and when it
+    was read (s).
+    """
+
+    number: int | None
+    at: float
+
+
+class Position(NamedTuple):
+    """The position of a command in its stream: the `beat` that it echoes (ns), then its `number`.
+    The beat is compared first: a forged number counts only until the next beat.
+    """
+
+    beat: int
+    number: int
+
+
+class Late(NamedTuple):
+    """Commands of a stream that came too late to begin with, one after the other: when the first
+    and the last of them arrived (s).
+    """
+
+    first: float
+    last: float
+
+
 class Judged(NamedTuple, Generic[M]):
-    """A command, the earliest time (s) at which it may have been sent, its greatest possible age (s; 0: unknown), and
-    why it is refused, or "". `latest` and `silence` are those of `Sent`, as far as they are known.
+    """A command with what is known of its sending.
+
+    Attributes:
+        received: The command.
+        sent: When it was sent.
+        age: Its greatest possible age in s; None for a sender that echoes nothing.
+        refused: Why it is refused; None if it is not.
     """
 
     received: Received[M]
-    sent: float
-    age: float
-    refusal: str
-    latest: float = math.inf
-    silence: float = math.inf
+    sent: Sent
+    age: float | None = None
+    refused: Decision | None = None
 
 
 class Freshness(Generic[M]):
     """Judges the age of the commands of one robot before anything else reads them.
 
-    The age of a stamped command (see holozen.transport.samples.Stamp) is measured by its sender's clock; the command
-    waits until that is known, for at most 0.5 s. The greatest possible age counts. A command is refused if it is older
-    than `max_age` or out of order, or if its sender has left. A slow command that would set the robot moving suggests
-    that a link was held up. So its sender first has to answer a request, which no dead process does, and only commands
-    that arrive after the answer move the robot.
+    A motion is refused if its echo is older than `max_age`, if its number goes back, or if its
+    sender has left. A source that does not move the robot begins by an echo younger than BEGIN_AGE;
+    or, over a slow link, by the echo of a beat that was sent after the first such command had
+    arrived, which no dead process sends.
 
-    The age of a command without a stamp is unknown. Of those that arrive together only the newest counts.
+    The age of a command without a stamp is unknown. Of those that arrive together only the newest
+    counts.
 
-    A stop passes at any age; whether its sender may stop the robot is decided elsewhere. `stops` tells whether a
-    message is a stop, `drives` whether a source moves the robot at a time.
+    A stop passes at any age; whether its sender may stop the robot is decided elsewhere. `stops`
+    tells whether a message is a stop. The `arbiters` know which source moves the robot, and since
+    when its commands count.
+
+    Attributes:
+        max_age: The limit in s.
     """
 
     def __init__(
-        self, keys: tuple[str, ...], senders: Senders, stops: Callable[[M], bool], drives: Callable[[str, float], bool]
+        self,
+        keys: tuple[str, ...],
+        senders: Senders,
+        stops: Callable[[M], bool],
+        arbiters: Iterable[Arbiter],
     ) -> None:
-        self._keys, self._senders, self._drives = keys, senders, drives
-        self.stops = stops  # whether a message is a stop
+        self._keys = keys
+        self._senders = senders
+        self._arbiters = tuple(arbiters)
+        self.stops = stops
         self.max_age = COMMAND_SILENCE
-        self._newest: OrderedDict[Sender, tuple[float, int]] = OrderedDict()  # the newest command: sent when, number
-        self._heard: OrderedDict[Sender, tuple[float, int]] = OrderedDict()  # likewise, for each name of a session
-        self._doubted: OrderedDict[Sender, float] = OrderedDict()  # since when an answer is awaited
-        self._waiting: dict[Sender, tuple[Received[M], float]] = {}  # with the arrival of its sender's first one
-        self._void: list[Received[M]] = []  # of those that waited, to be refused
-
-    @property
-    def is_waiting(self) -> bool:
-        """Whether any command waits for its sender's clock."""
-        return bool(self._waiting or self._void)
-
-    @property
-    def waiting(self) -> list[Received[M]]:
-        """The commands that wait for their sender's clock, the newest of each."""
-        return [received for received, _ in self._waiting.values()]
-
-    def drop_waiting(self) -> None:
-        """Refuse the commands that wait now, whatever their age will prove to be."""
-        self._void += self.waiting
-        self._waiting.clear()
+        self._newest: OrderedDict[Stream, Position] = OrderedDict()
+        self._heard: OrderedDict[Speaker, Heard] = OrderedDict()
+        self._held_up: OrderedDict[Stream, Late] = OrderedDict()
 
     def sift(self, arrived: Iterable[Received[M]], now: float, since: float) -> Iterator[Judged[M]]:
-        """Judge the commands in order: those that waited, then those that `arrived` between `since` and `now` (s)."""
+        """Judge in order the commands that `arrived` between `since` and `now` (s)."""
         arrived = list(arrived)
-        void, self._void = self._void, []
-        for received in void:
-            yield Judged(received, -math.inf, 0.0, VOID)
-        if self._waiting:
-            yield from self._waited(now)
-        senders = [*map(_sender, arrived)]
-        newest = {sender: index for index, sender in enumerate(senders)}
-        for index, (received, sender) in enumerate(zip(arrived, senders, strict=True)):
-            stamp = received.stamp
-            if received.message is None or sender.key not in self._keys:
-                yield Judged(received, since, 0.0, "")  # refused later, by CommandStats.validated
-            elif self.stops(received.message):
-                self._waiting.pop(sender, None)  # earlier commands are void
-                if stamp and self._ages(stamp, now):
-                    self._gap(received, stamp)
-                    self._note(stamp, sender)
-                yield Judged(received, now if stamp else since, 0.0, "")
-            elif stamp:
-                if judged := self._judge(received, stamp, sender, now, now):
-                    yield judged
-            elif any(map(self._senders.has, self._sessions(received.source))):
-                yield Judged(received, since, 0.0, UNSTAMPED)
-            elif newest[sender] == index:
-                yield Judged(received, since, 0.0, "")
+        last_unstamped = {
+            _unstamped_key(each): index for index, each in enumerate(arrived) if not each.stamp
+        }
+        for index, received in enumerate(arrived):
+            if received.message is None or received.key not in self._keys:
+                # refused later, by CommandStats.validated
+                yield Judged(received, Sent(at=since, unheard=now))
+                continue
+            stops = self.stops(received.message)
+            if received.stamp:
+                yield self._stamped(received, received.stamp, stops, now)
+            elif stops or last_unstamped[_unstamped_key(received)] == index:
+                yield self._unstamped(received, stops, now, since)
 
     def is_session(self, source: str, session: str) -> bool:
-        """Whether a source may be this session: it is, or no session of that name has stamped a command."""
+        """Whether a source may be this session: it is, or no session of that name has stamped a
+        command.
+        """
         known = self._sessions(source)
         return not known or session in known
 
     def _sessions(self, source: str) -> set[str]:
         """The sessions that have stamped commands under a source's name."""
         start = source.rpartition("@")[2]
-        return {sender.session for sender in self._newest if sender.session[:6] == start}
+        return {stream.session for stream in self._newest if stream.session[:6] == start}
 
-    def _ages(self, stamp: Stamp, now: float) -> tuple[float, float] | None:
-        there = self._senders.has(stamp.session)
-        return self._senders.ages(stamp.session, stamp.sent, now, stamp.member) if there else None
+    def _unstamped(self, received: Received[M], stops: bool, now: float, since: float) -> Judged[M]:
+        """Judge a command whose age is unknown: it was sent as it arrived."""
+        speaker = Speaker(received.source, received.key)
+        before = self._heard.get(speaker)
+        _put(self._heard, speaker, Heard(None, now))
+        silence = math.inf if before is None else max(0.0, since - before.at)
+        sent = Sent(at=since, unheard=now, silence=silence)
+        if stops:
+            return Judged(received, sent)
+        if any(map(self._senders.has, self._sessions(received.source))):
+            return Judged(received, sent, refused=refusal(Outcome.UNSTAMPED, UNSTAMPED))
+        if now - since > self.max_age:
+            waited = WAITED.format(age=now - since, limit=self.max_age)
+            return Judged(received, sent, refused=refusal(Outcome.OLD, waited))
+        return Judged(received, sent)
 
-    def _waited(self, now: float) -> Iterator[Judged[M]]:
-        waiting, self._waiting = self._waiting, {}
-        for sender, (received, came) in waiting.items():
-            stamp = received.stamp
-            if stamp and (judged := self._judge(received, stamp, sender, came, now)):
-                yield judged
+    def _stamped(self, received: Received[M], stamp: Stamp, stops: bool, now: float) -> Judged[M]:
+        """Judge a command by its echo."""
+        speaker = Speaker(received.source, received.key)
+        is_there = self._senders.has(stamp.session)
+        beat = self._senders.echo(stamp.echoes) if is_there else None
+        if beat is None:
+            # Its number counts: what follows it is no first command, and nothing between the two
+            # was unheard.
+            self._hear(speaker, stamp.number, now, now)
+            if stops:
+                return Judged(received, Sent(now, now, 0.0))
+            unknown = refusal(Outcome.NO_ECHO, NO_ECHO) if is_there else refusal(Outcome.GONE, GONE)
+            return Judged(received, Sent(now, now, 0.0), refused=unknown)
+        age = self._senders.age(beat, now)
+        sent = self._hear(speaker, stamp.number, now - age, now)
+        stream = Stream(stamp.session, received.priority, received.key)
+        before, position = self._newest.get(stream), Position(beat, stamp.number)
+        _put(self._newest, stream, max(position, before) if before else position)
+        if stops:
+            self._held_up.pop(stream, None)
+            return Judged(received, sent, age)
+        if before and position <= before:
+            disorder = OUT_OF_ORDER.format(number=position.number, last=before.number)
+            return Judged(received, sent, age, refusal(Outcome.OUT_OF_ORDER, disorder))
+        return Judged(received, sent, age, self._refuse_late(stream, age, source_of(received), now))
 
-    def _judge(self, received: Received[M], stamp: Stamp, sender: Sender, came: float, now: float) -> Judged[M] | None:
-        """Judge a command that moves the robot; None while it waits for its sender's clock."""
-        session, ages = stamp.session, self._ages(stamp, now)
-        if ages is None:
-            return self._wait(received, stamp, sender, came, now)
-        before = self._newest.get(sender, (-math.inf, -1))
-        self._note(stamp, sender)
-        youngest, oldest = ages
-        silence, missing = self._gap(received, stamp)
-        judged = Judged(received, now - oldest, oldest, "", now - youngest - missing, silence)
-        # The time is compared first: a forged number would count for as long as the session lives, a forged time only
-        # until that time has come.
-        if (stamp.sent, stamp.number) <= before:
-            return judged._replace(refusal=OUT_OF_ORDER.format(number=stamp.number, last=before[1]))
-        if sender not in self._doubted and youngest > PROMPT and not self._drives(source_of(received), now):
-            _put(self._doubted, sender, now)
-            self._senders.ask_now(session, now)
-        if sender in self._doubted:
-            if self._senders.answered(session) < self._doubted[sender]:
-                return judged._replace(refusal=UNANSWERED.format(age=youngest))
-            del self._doubted[sender]
-        return judged._replace(refusal=OLD.format(age=oldest, limit=self.max_age)) if oldest > self.max_age else judged
-
-    def _gap(self, received: Received[M], stamp: Stamp) -> tuple[float, float]:
-        """The time (s) since the sample that its source sent before this one, on the source's clock: as a silence if
-        that one arrived (infinite if none did), and as a time in which samples were sent that are missing.
+    def _refuse_late(self, stream: Stream, age: float, source: str, now: float) -> Decision | None:
+        """The refusal of a motion that is too old, which is noted; None for one that is fresh
+        enough.
         """
-        source = Sender(received.source, "", received.key)  # numbers of all priorities are one sequence
-        before = self._heard.get(source)
-        if before and stamp.number <= before[1]:  # it was overtaken
-            return math.inf, 0.0
-        _put(self._heard, source, (stamp.sent, stamp.number))
-        if not before:
-            return math.inf, 0.0
-        passed = max(0.0, stamp.sent - before[0])
-        return (passed, 0.0) if stamp.number == before[1] + 1 else (0.0, passed)
-
-    def _wait(self, received: Received[M], stamp: Stamp, sender: Sender, came: float, now: float) -> Judged[M] | None:
-        there = self._senders.has(stamp.session)
-        if sender in self._waiting:
-            came = min(came, self._waiting[sender][1])
-        if now - came > COMMAND_SILENCE or (sender not in self._waiting and len(self._waiting) >= MAX_WAITING):
-            self._waiting.pop(sender, None)
-            return Judged(received, -math.inf, 0.0, UNKNOWN if there else GONE)
-        if there:
-            self._senders.track_first(stamp.session, now)
-        self._waiting[sender] = (received, came)
+        if age > self.max_age:
+            self._note_late(stream, now)
+            return refusal(Outcome.OLD, OLD.format(age=age, limit=self.max_age))
+        begins = age > BEGIN_AGE and not any(
+            arbiter.moves(source, now) for arbiter in self._arbiters
+        )
+        if begins and now - age <= self._note_late(stream, now):
+            return refusal(Outcome.HELD_UP, HELD_UP.format(age=age))
+        self._held_up.pop(stream, None)
         return None
 
-    def _note(self, stamp: Stamp, sender: Sender) -> None:
-        _put(self._newest, sender, max((stamp.sent, stamp.number), self._newest.get(sender, (-math.inf, -1))))
+    def _note_late(self, stream: Stream, now: float) -> float:
+        """Note that a command came late. Returns when the first of those arrived that came without
+        a pause since.
+        """
+        before = self._held_up.get(stream)
+        first = before.first if before and now - before.last <= COMMAND_SILENCE else now
+        _put(self._held_up, stream, Late(first, now))
+        return first
+
+    def _hear(self, speaker: Speaker, number: int, at: float, now: float) -> Sent:
+        """Note the number of a command that was sent after `at` (s). Returns what is known of its
+        sending.
+        """
+        before = self._heard.get(speaker)
+        is_first = number == 0
+        # it was overtaken
+        if not is_first and before and before.number is not None and number <= before.number:
+            return Sent(at, at, 0.0)
+        _put(self._heard, speaker, Heard(number, now))
+        if is_first:
+            return Sent(at, at)
+        if before is None:
+            began = max((arbiter.state.began for arbiter in self._arbiters), default=0.0)
+            return Sent(at, min(at, began), 0.0)
+        if before.number is None or number == before.number + 1:
+            return Sent(at, at, max(0.0, at - before.at))
+        return Sent(at, min(at, before.at), 0.0)
 
 
-def _put(table: OrderedDict[Sender, T], sender: Sender, value: T) -> None:
-    """Write to a table of at most MAX_KNOWN senders, which forgets the one that was written longest ago."""
-    table[sender] = value
-    table.move_to_end(sender)
+def _put(table: OrderedDict[K, T], key: K, value: T) -> None:
+    """Write to a table of at most MAX_KNOWN keys, which forgets the one that was written longest
+    ago.
+    """
+    table[key] = value
+    table.move_to_end(key)
     if len(table) > MAX_KNOWN:
         table.popitem(last=False)
 
 
-def _sender(received: Received[M]) -> Sender:
-    stamp = received.stamp
-    return Sender(stamp.session if stamp else received.source, received.priority, received.key)
+def _unstamped_key(received: Received[M]) -> tuple[str, str, str]:
+    """Of commands without stamps that have the same key here and arrive together, only the newest
+    counts.
+    """
+    return received.source, received.priority, received.key
 
 
 def source_of(received: Received[M]) -> str:

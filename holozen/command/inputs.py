@@ -1,4 +1,6 @@
-"""Commands on one robot's cmd_vel, joint_command and forces: checked, limited, counted, and passed to the arbiters."""
+"""Commands on one robot's cmd_vel, joint_command and forces: checked, limited, counted, and passed
+to the arbiters.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +10,30 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from holozen.command.arbiter import Arbiter, Sent
+from holozen.command.arbiter import Arbiter, Sent, Source
 from holozen.command.freshness import Freshness, Judged, Senders, source_of
-from holozen.command.motion import AppliedForce, AppliedForces, JointMotion, Motion, is_stop, motion_of
+from holozen.command.motion import (
+    AppliedForce,
+    AppliedForces,
+    JointMotion,
+    Motion,
+    is_stop,
+    motion_of,
+)
+from holozen.command.outcome import Decision
 from holozen.command.wait_set import Moment, Reader
 from holozen.console import report
 from holozen.limits import STOP, Planar, clamp_speed
-from holozen.messages import CommandSource, CommandStatus, Header, JointState, Message, Twist, TwistStamped, Wrench
+from holozen.messages import (
+    CommandSource,
+    CommandStatus,
+    Header,
+    JointState,
+    Message,
+    Twist,
+    TwistStamped,
+    Wrench,
+)
 from holozen.messages.message import not_finite
 from holozen.suggest import listed
 from holozen.transport.pubsub import Received, Subscription
@@ -24,22 +43,25 @@ from holozen.wire import MAX_STAMP_AGE, implausible
 MAX_LINEAR = 5.0  # m/s
 MAX_ANGULAR = 10.0  # rad/s
 LINEAR, ANGULAR = (0.01, 50.0), (0.01, 100.0)  # the ranges in which these two may be set
-MAX_RATES = 16  # sources, whose names come over the wire; beyond, the oldest of the lowest rank is forgotten
+# sources, whose names come over the wire; beyond, the oldest of the lowest rank is forgotten
+MAX_RATES = 16
 RECENT = 3.0  # s for which a source is listed
 SPAN = 1.0  # s over which the rate is measured
 MARK = 0.1  # s between two samples of a count
 REPORT_EVERY = 1.0  # s
-MAX_LINES = 10  # a second by all robots: if a fleet's driver fails, each of them has something to report
+# a second by all robots: if a fleet's driver fails, each of them has something to report
+MAX_LINES = 10
 M = TypeVar("M", bound=Message)
 
-PART = "part: it stops one topic or joint while its source moves another, so it is no stop"
-TWIST = "cmd_vel"  # one part, whichever of the robot's keys a velocity comes on: a zero on any of them ends it
+PARTIAL_STOP = "part: partial stop: this source still moves another joint or topic"
+# one part, whichever of the robot's keys a velocity comes on: a zero on any of them ends it
+TWIST = "cmd_vel"
 UNPROVEN = "unproven"  # the kind of refusal of a command without proof of its sender's name
 
 
 class Command(NamedTuple, Generic[M]):
-    """A valid message on `key` from `source`, with its `rank`, read at a `moment`, and `sent` then. `age` in s is that
-    by the stamp in its header; 0 without one.
+    """A valid message on `key` from `source`, with its `rank`, read at a `moment`, and `sent` then.
+    `age` in s is that by the stamp in its header; 0 without one.
     """
 
     message: M
@@ -52,32 +74,36 @@ class Command(NamedTuple, Generic[M]):
 
 
 class Input(Generic[M]):
-    """Checks the commands on some keys, and passes those that are valid and fresh to the arbiters."""
+    """Checks the commands on some keys, and passes those that are valid and fresh to the
+    arbiters.
+    """
 
     def __init__(
-        self, keys: tuple[str, ...], freshness: Freshness[M], stats: CommandStats, arbiters: Iterable[Arbiter]
+        self,
+        keys: tuple[str, ...],
+        freshness: Freshness[M],
+        stats: CommandStats,
+        arbiters: Iterable[Arbiter],
     ) -> None:
-        self.keys, self.freshness, self.stats, self._arbiters = keys, freshness, stats, tuple(arbiters)
+        self.keys, self.freshness, self.stats, self._arbiters = (
+            keys,
+            freshness,
+            stats,
+            tuple(arbiters),
+        )
 
     def reader(self, commands: Subscription[M]) -> Reader:
-        """A reader of the commands that wait at a subscription. It is unfinished while any waits for a clock."""
+        """A reader of the commands that wait at a subscription."""
         return Reader(commands.raw.channel, partial(self._read, commands))
 
     def _read(self, commands: Subscription[M], first: Any, moment: Moment) -> bool:
         self.take(commands.waiting(first), moment)
-        return self.freshness.is_waiting
+        return False
 
     def take(self, arrived: Iterable[Received[M]], moment: Moment) -> None:
-        """Process the samples that `arrived` by that moment, and those that waited for their sender's clock."""
+        """Process the samples that `arrived` by that moment."""
         for judged in self.freshness.sift(arrived, moment.now, moment.since):
             self._take(judged, moment)
-        for received in self.freshness.waiting:  # whatever becomes of it, its source has not let go
-            sent = Sent(moment.since, moment.now, 0.0)
-            self._note_refused(source_of(received), PRIORITIES.index(received.priority), moment.now, sent)
-
-    def _note_refused(self, source: str, rank: int, now: float, sent: Sent) -> None:
-        for arbiter in self._arbiters:
-            arbiter.note_refused(source, rank, now, sent)
 
     def _take(self, judged: Judged[M], moment: Moment) -> None:
         received = judged.received
@@ -85,22 +111,31 @@ class Input(Generic[M]):
         self._note(judged, source, rank, moment.now)
         message = self.stats.validated(received, self.keys, moment.now)
         if message is None:
+            if received.message is not None and not self.freshness.stops(received.message):
+                # an impossible motion is one too
+                self._note_refused(source, rank, moment.now, judged.sent)
             return
         age = self._stamp_age(message, moment)
-        sent = Sent(min(judged.sent, moment.now - age), min(judged.latest, moment.now), judged.silence)
+        sent = judged.sent._replace(at=min(judged.sent.at, moment.now - age))
         command = Command(message, received.key, source, rank, moment, sent, age)
-        if refusal := judged.refusal or self._refusal(command):
+        why = judged.refused.reason if judged.refused else self._refusal(command)
+        if why:
             self._note_refused(source, rank, moment.now, sent)
-            self._refuse(command, refusal)
+            self._refuse(command, why)
         else:
             self._obey(command)
+
+    def _note_refused(self, source: str, rank: int, now: float, sent: Sent) -> None:
+        """A source that commands has not let go, whatever becomes of its command."""
+        for arbiter in self._arbiters:
+            arbiter.note_refused(source, rank, now, sent)
 
     def _note(self, judged: Judged[M], source: str, rank: int, now: float) -> None:
         """Called for each sample, whether it is valid or not. Does nothing; override it."""
 
     def _stamp_age(self, message: M, moment: Moment) -> float:
-        """The age in s of a message by the stamp in its header, by the nearest clock; 0 without one. A stop may have
-        any stamp.
+        """The age in s of a message by the stamp in its header, by the nearest clock; 0 without
+        one. A stop may have any stamp.
         """
         header: Header | None = getattr(message, "header", None)
         if not header or not (stamp := header.stamp.seconds()) or self.freshness.stops(message):
@@ -108,7 +143,9 @@ class Input(Generic[M]):
         return min((now - stamp for now in moment.clocks), key=abs)
 
     def _refusal(self, command: Command[M]) -> str:
-        """Why a command is refused, beginning with the kind of reason and a colon; empty if it is not."""
+        """Why a command is refused, beginning with the kind of reason and a colon; empty if it is
+        not.
+        """
         if abs(command.age) > MAX_STAMP_AGE:
             return f"stale: its stamp is {command.age:.1f} s old; at most {MAX_STAMP_AGE} s"
         return ""
@@ -118,25 +155,32 @@ class Input(Generic[M]):
         raise NotImplementedError
 
     def _offer(
-        self, arbiter: Arbiter, command: Command[M], motion: Motion, parts: Iterable[tuple[str, bool]],
+        self,
+        arbiter: Arbiter,
+        command: Command[M],
+        motion: Motion,
+        parts: list[tuple[str, bool]],
         is_whole: bool = False,
-    ) -> bool:  # fmt: skip
-        """Pass a command's motion to an arbiter, and count it. Returns whether it is accepted. `parts` are those that
-        it commands, and whether it moves them. While its source moves another part, a stop lets go of nothing, and it
-        stops the robot only if the source drives that, or if it `is_whole`: one of the robot, not of its parts.
+    ) -> bool:
+        """Pass a command's motion to an arbiter, and count it. Returns whether it is obeyed.
+        `parts` are those that it commands, and whether it moves them. While its source moves
+        another part, a stop lets go of nothing, and it stops the robot only if the source drives
+        that, or if it `is_whole`: one of the robot, not of its parts.
         """
         source, rank, now = command.source, command.rank, command.moment.now
-        moves = arbiter.parts.record(source, rank, parts, arbiter.time.at(now))
+        moves = arbiter.parts.record(Source(source, rank), parts, arbiter.time.at(now))
         if moves and is_stop(motion) and not (is_whole or arbiter.is_driver(source, rank, now)):
             arbiter.note_refused(source, rank, now, command.sent)
-            reason = PART
-        else:
-            reason = arbiter.offer(source, rank, motion, now, command.sent, lets_go=not moves)
-        if reason:
-            self._refuse(command, reason)
-        else:
+            self._refuse(command, PARTIAL_STOP)
+            return False
+        decision: Decision = arbiter.offer(
+            source, rank, motion, now, command.sent, lets_go=not moves
+        )
+        if decision.outcome.is_obeyed:
             self.stats.accepted += 1
-        return not reason
+        else:
+            self._refuse(command, decision.reason)
+        return decision.outcome.is_obeyed
 
     def _refuse(self, command: Command[M], reason: str, kind: str = "") -> None:
         """Count a refusal, by default under the `kind` that the reason begins with."""
@@ -151,53 +195,79 @@ class Input(Generic[M]):
 class TwistInput(Input[Twist | TwistStamped]):
     """The velocity commands of one robot, clamped to `linear` (m/s) and `angular` (rad/s).
 
-    Reports name the robot by `key`, its cmd_vel; `others` are additional command keys. With a `refusal`, all commands
-    but stops are refused for that reason. `limit` bounds the reports of all robots that share it.
+    Reports name the robot by `key`, its cmd_vel; `others` are additional command keys. With a
+    `refusal`, all commands but stops are refused for that reason. `limit` bounds the reports of all
+    robots that share it.
+
+    Attributes:
+        on_news: Called at a time (s) when a status has something new to tell: another source; or,
+            while the sim is paused, any command, since a process that steps the sim waits until its
+            command has been read.
     """
 
     def __init__(
-        self, key: str, arbiter: Arbiter, senders: Senders, linear: float, angular: float,
-        report: Callable[[str], None] = report, others: tuple[str, ...] = (), refusal: str = "",
+        self,
+        key: str,
+        arbiter: Arbiter,
+        senders: Senders,
+        linear: float,
+        angular: float,
+        report: Callable[[str], None] = report,
+        others: tuple[str, ...] = (),
+        refusal: str = "",
         limit: ReportLimit | None = None,
-    ) -> None:  # fmt: skip
-        freshness: Freshness[Twist | TwistStamped] = Freshness((key, *others), senders, _stops, arbiter.moves)
+    ) -> None:
+        freshness: Freshness[Twist | TwistStamped] = Freshness(
+            (key, *others), senders, _stops, (arbiter,)
+        )
         super().__init__((key, *others), freshness, CommandStats(report, limit), (arbiter,))
-        self.arbiter, self.linear, self.angular, self._always_refused = arbiter, linear, angular, refusal
+        self.arbiter, self.linear, self.angular, self._always_refused = (
+            arbiter,
+            linear,
+            angular,
+            refusal,
+        )
         self._rates = SourceRates()
-        # Whether there is a source that no status has named yet, or, while the sim is paused, any command: a process
-        # that steps the sim waits until its command has been read.
-        self.has_news = False
-        self.on_news: Callable[[float], None] = lambda now: None  # called at `now` (s) when there is news
+        self._has_news = False
+        self.on_news: Callable[[float], None] = lambda now: None
 
     def take(self, arrived: Iterable[Received[Twist | TwistStamped]], moment: Moment) -> None:
         """Process samples as every input does, then call `on_news` if there is news."""
         super().take(arrived, moment)
-        if self.has_news:
+        has_news, self._has_news = self._has_news, False
+        if has_news:
             self.on_news(moment.now)
 
-    def _note(self, judged: Judged[Twist | TwistStamped], source: str, rank: int, now: float) -> None:
+    def _note(
+        self, judged: Judged[Twist | TwistStamped], source: str, rank: int, now: float
+    ) -> None:
         if not judged.received.error.startswith(UNPROVEN):  # its source is a claim
-            self.has_news |= self._rates.record(source, rank, now, judged.age) or self.arbiter.time.is_paused
+            self._has_news |= (
+                self._rates.record(source, rank, now, judged.age or 0.0)
+                or self.arbiter.time.is_paused
+            )
 
     def status(self, now: float) -> CommandStatus:
         """The source that drives, the sources of recent commands, and the counts so far."""
-        self.has_news = False
         driver, held = self.arbiter.driver(now), self.arbiter.holds
         driver = None if driver and driver.gone else driver
-        obeyed = driver.source if driver else ""
-        motion = driver.motion if driver and isinstance(driver.motion, tuple) else STOP  # that of joints is no velocity
+        obeyed = driver.source.name if driver else ""
+        # that of joints is no velocity
+        motion = driver.motion if driver and isinstance(driver.motion, tuple) else STOP
         return CommandStatus(
             commanded=Twist.planar(*motion),
             obeyed=obeyed,
-            priority=PRIORITIES[driver.rank] if driver else "",
+            priority=PRIORITIES[driver.source.rank] if driver else "",
             held=self.arbiter.held,
             resumed=self.arbiter.resumed,
             accepted=self.stats.accepted,
             refused=dict(self.stats.refused),
             last_refusal=self.stats.last,
-            stopped=self.arbiter.software_stop.setter,
+            stopped=self.arbiter.stopped_by or "",
             sources=[
-                CommandSource(source, PRIORITIES[rank], rate, source == obeyed, held(source, rank, now), delay)
+                CommandSource(
+                    source, PRIORITIES[rank], rate, source == obeyed, held(source, rank, now), delay
+                )
                 for source, rank, rate, delay in self._rates.recent(now)
             ],
         )
@@ -211,8 +281,14 @@ class TwistInput(Input[Twist | TwistStamped]):
         velocity = _velocity(command.message)
         limited = clamp_speed(velocity, self.linear, self.angular)
         parts = [(TWIST, not is_stop(limited))]
-        if self._offer(self.arbiter, command, limited, parts, is_whole=True) and limited != velocity:
-            text = f"over the limits of {self.linear:g} m/s and {self.angular:g} rad/s, clamped: {velocity}"
+        if (
+            self._offer(self.arbiter, command, limited, parts, is_whole=True)
+            and limited != velocity
+        ):
+            text = (
+                f"over the limits of {self.linear:g} m/s and {self.angular:g} rad/s, clamped: "
+                f"{velocity}"
+            )
             self._refuse(command, text, "clamped")
 
     def _reported(self, command: Command[Twist | TwistStamped]) -> str:
@@ -229,8 +305,9 @@ def _stops(message: Twist | TwistStamped) -> bool:
 
 
 class JointInput(Input[JointState]):
-    """The joint commands of one robot. Each of the `groups` of joints has an arbiter; `known` are all joints. The
-    wheels share the arbiter of cmd_vel, so that a person at the teleop has priority.
+    """The joint commands of one robot. Each of the `groups` of joints has an arbiter; `known` are
+    all joints. The wheels share the arbiter of cmd_vel, so that a person at the teleop has
+    priority.
     """
 
     def __init__(
@@ -241,8 +318,9 @@ class JointInput(Input[JointState]):
         groups: list[tuple[frozenset[str], Arbiter]],
         known: list[str],
     ) -> None:
-        freshness: Freshness[JointState] = Freshness((key,), senders, _joints_stop, self._moves)
-        super().__init__((key,), freshness, stats, (arbiter for _, arbiter in groups))
+        arbiters = [arbiter for _, arbiter in groups]
+        freshness: Freshness[JointState] = Freshness((key,), senders, _joints_stop, arbiters)
+        super().__init__((key,), freshness, stats, arbiters)
         self._groups, self._known = groups, known
 
     def _obey(self, command: Command[JointState]) -> None:
@@ -253,20 +331,24 @@ class JointInput(Input[JointState]):
         accepted = self.stats.accepted
         for names, arbiter in self._groups:
             if part := motion.only(names):
-                each = [(name, part.kind == "position" or value != 0) for name, value in part.values]
+                each = [
+                    (name, part.kind == "position" or value != 0) for name, value in part.values
+                ]
                 self._offer(arbiter, command, part, each)
-        self.stats.accepted = min(self.stats.accepted, accepted + 1)  # one command, though for several arbiters
-
-    def _moves(self, source: str, now: float) -> bool:
-        return any(arbiter.moves(source, now) for arbiter in self._arbiters)
+        # one command, though for several arbiters
+        self.stats.accepted = min(self.stats.accepted, accepted + 1)
 
     def _checked(self, motion: JointMotion) -> JointMotion:
         moved = frozenset[str]().union(*(names for names, _ in self._groups))
         for name, _ in motion.values:
             if name not in self._known:
-                raise ValueError(f"there is no joint {name!r}; the joints are {listed(self._known)}")
+                raise ValueError(
+                    f"there is no joint {name!r}; the joints are {listed(self._known)}"
+                )
             if name not in moved:
-                raise ValueError(f"joint {name!r} follows the drive; only {listed(moved)} take commands")
+                raise ValueError(
+                    f"joint {name!r} follows the drive; only {listed(moved)} take commands"
+                )
         return motion
 
 
@@ -280,12 +362,16 @@ def _joints_stop(message: JointState) -> bool:
 class ForceInput(Input[Wrench]):
     """The wrenches on a robot's `keys`. One source drives at a time: all that act are its own."""
 
-    def __init__(self, keys: tuple[str, ...], arbiter: Arbiter, senders: Senders, stats: CommandStats) -> None:
-        super().__init__(keys, Freshness(keys, senders, _pushes_nothing, arbiter.moves), stats, (arbiter,))
+    def __init__(
+        self, keys: tuple[str, ...], arbiter: Arbiter, senders: Senders, stats: CommandStats
+    ) -> None:
+        super().__init__(
+            keys, Freshness(keys, senders, _pushes_nothing, (arbiter,)), stats, (arbiter,)
+        )
 
     def _obey(self, command: Command[Wrench]) -> None:
         (arbiter,), now = self._arbiters, command.moment.now
-        age = 0.0 if arbiter.time.is_paused else now - command.sent.earliest
+        age = 0.0 if arbiter.time.is_paused else now - command.sent.at
         push = AppliedForce(command.key, _wrench(command.message), arbiter.time.at(now) - age)
         others = arbiter.pushes_of(command.source, command.rank, now).without(command.key)
         parts = [(command.key, any(push.wrench))]
@@ -302,13 +388,16 @@ def _pushes_nothing(message: Wrench) -> bool:
 
 
 class SourceRate:
-    """One source: the time and the `delay` of its last command (s), and the number of its commands."""
+    """One source: the time and the `delay` of its last command (s), and the number of its
+    commands.
+    """
 
     __slots__ = ("_marks", "count", "delay", "last")
 
     def __init__(self, now: float) -> None:
         self.last, self.count, self.delay = now, 0, 0.0
-        self._marks: deque[tuple[float, int]] = deque([(now, 0)])  # past counts, the oldest about SPAN ago
+        # past counts, the oldest about SPAN ago
+        self._marks: deque[tuple[float, int]] = deque([(now, 0)])
 
     def rate(self, now: float) -> float:
         """Command rate (Hz) over about the last second."""
@@ -328,8 +417,8 @@ class SourceRates:
         self._all: dict[tuple[str, int], SourceRate] = {}
 
     def record(self, source: str, rank: int, now: float, delay: float = 0.0) -> bool:
-        """Record a command from `source` at `now` (s), at most `delay` seconds old (0: unknown). Returns whether the
-        source is new.
+        """Record a command from `source` at `now` (s), at most `delay` seconds old (0: unknown).
+        Returns whether the source is new.
         """
         each = self._all.get((source, rank))
         if is_new := each is None:
@@ -343,12 +432,16 @@ class SourceRates:
     def recent(self, now: float) -> list[tuple[str, int, float, float]]:
         """(source, rank, rate in Hz, delay in s) of recent sources, the highest rank first."""
         self._all = {name: each for name, each in self._all.items() if now - each.last <= RECENT}
-        rows = ((name, rank, each.rate(now), each.delay) for (name, rank), each in self._all.items())
+        rows = (
+            (name, rank, each.rate(now), each.delay) for (name, rank), each in self._all.items()
+        )
         return sorted(rows, key=lambda row: (row[1], row[0]))
 
 
 class ReportLimit:
-    """Lets MAX_LINES reports of refused commands through in a second, by all robots that share it."""
+    """Lets MAX_LINES reports of refused commands through in a second, by all robots that share
+    it.
+    """
 
     def __init__(self) -> None:
         self._since, self._written = -math.inf, 0
@@ -364,7 +457,9 @@ class ReportLimit:
 class CommandStats:
     """Counts accepted commands, and refused ones by kind. `last` is the last refusal."""
 
-    def __init__(self, report: Callable[[str], None] = report, limit: ReportLimit | None = None) -> None:
+    def __init__(
+        self, report: Callable[[str], None] = report, limit: ReportLimit | None = None
+    ) -> None:
         self._limit = limit or ReportLimit()
         self.accepted = 0
         self.refused: Counter[str] = Counter()
@@ -374,7 +469,9 @@ class CommandStats:
         self._unreported = 0
 
     def validated(self, received: Received[M], keys: tuple[str, ...], now: float) -> M | None:
-        """The message of a sample on one of `keys`; None if it is not valid, which is counted and reported."""
+        """The message of a sample on one of `keys`; None if it is not valid, which is counted and
+        reported.
+        """
         kind, reason = _fault(received, keys)
         if kind:
             self.refuse(keys[0], kind, reason, source_of(received), now)

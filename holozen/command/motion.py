@@ -10,7 +10,9 @@ from holozen.messages import JointState
 
 
 class JointMotion(Struct, frozen=True):
-    """Values for joints by name: `kind` is "position" (rad, m), "velocity" (rad/s, m/s) or "effort" (N m, N)."""
+    """Values for joints by name: `kind` is "position" (rad, m), "velocity" (rad/s, m/s) or "effort"
+    (N m, N).
+    """
 
     kind: str
     values: tuple[tuple[str, float], ...]
@@ -27,7 +29,9 @@ class JointMotion(Struct, frozen=True):
 
 
 class AppliedForce(NamedTuple):
-    """The wrench of one topic, sent at `sent` (s) at the earliest: force x, y, z in N, then torque x, y, z in N m."""
+    """The wrench of one topic, sent at `sent` (s) at the earliest: force x, y, z in N, then torque
+    x, y, z in N m.
+    """
 
     key: str
     wrench: tuple[float, float, float, float, float, float]
@@ -66,10 +70,14 @@ def motion_of(command: JointState) -> JointMotion:
     given = {"position": command.position, "velocity": command.velocity, "effort": command.effort}
     kinds = [kind for kind, values in given.items() if values]
     if len(kinds) != 1:
-        raise ValueError(f"give one of position, velocity and effort; {' and '.join(kinds) or 'none'} has values")
+        raise ValueError(
+            f"give one of position, velocity and effort; {' and '.join(kinds) or 'none'} has values"
+        )
     if len(command.name) != len(given[kinds[0]]):
         names, values = len(command.name), len(given[kinds[0]])
-        raise ValueError(f"name has length {names}, {kinds[0]} has {values}; give each joint one value")
+        raise ValueError(
+            f"name has length {names}, {kinds[0]} has {values}; give each joint one value"
+        )
     if len(set(command.name)) != len(command.name):
         raise ValueError("a joint is named twice")
     return JointMotion(kinds[0], tuple(zip(command.name, given[kinds[0]], strict=True)))

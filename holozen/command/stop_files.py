@@ -1,5 +1,5 @@
-"""Software stops in files, so that they outlast the process that serves a robot, a sim or a real base: the next one has
-the same robots stopped.
+"""Software stops in files, so that they outlast the process that serves a robot, a sim or a real
+base: the next one has the same robots stopped.
 """
 
 import os
@@ -18,11 +18,15 @@ UNREADABLE = "the robot's own process, which could not read who did"
 MAX_BYTES = 1000
 HANGS = 0.25  # s after which a disk counts as hung; meanwhile a base goes on at its last velocity
 HUNG = "the disk does not answer: the stop holds, and its file is written once it does"
-HUNG_AT_RELEASE = "the disk does not answer: until its file is removed, a new process has the robot stopped"
+HUNG_AT_RELEASE = (
+    "the disk does not answer: until its file is removed, a new process has the robot stopped"
+)
 
 
 def default_folder() -> Path | None:
-    """The folder where no flag gives one: HOLOZEN_STATE, else the user's own; None without a home."""
+    """The folder where no flag gives one: HOLOZEN_STATE, else the user's own; None without a
+    home.
+    """
     if given := os.environ.get("HOLOZEN_STATE"):
         return Path(given)
     base = os.environ.get("XDG_STATE_HOME", "")
@@ -31,13 +35,14 @@ def default_folder() -> Path | None:
 
 
 class StopFiles:
-    """Who stopped which robot. In `folder`, each network has a folder of its own, with a file for each stopped robot,
-    whichever process serves it. A process that is in several `networks` writes to the folders of all, and a robot is
-    stopped if any of them has its file. Reports begin with `reporter`.
+    """Who stopped which robot. In `folder`, each network has a folder of its own, with a file for
+    each stopped robot, whichever process serves it. A process that is in several `networks` writes
+    to the folders of all, and a robot is stopped if any of them has its file. Reports begin with
+    `reporter`.
 
-    A file is written before the stop is confirmed, but not synced: it outlasts the process, however that ends, but a
-    loss of power may undo the last seconds. A disk that hangs holds up no robot: another thread writes, and is waited
-    for no longer than HANGS.
+    A file is written before the stop is confirmed, but not synced: it outlasts the process, however
+    that ends, but a loss of power may undo the last seconds. A disk that hangs holds up no robot:
+    another thread writes, and is waited for no longer than HANGS.
     """
 
     def __init__(self, folder: Path, networks: Iterable[str], reporter: str = "sim") -> None:
@@ -45,7 +50,9 @@ class StopFiles:
         self._folders = [folder / _name(network) for network in networks]
         self._last: dict[str, str] = {}  # robot -> contents of all its files, if known
         self._reporter = reporter
-        self._reported = set[tuple[str, bool]]()  # robots whose stop, or release, could not be written
+        self._reported = set[
+            tuple[str, bool]
+        ]()  # robots whose stop, or release, could not be written
         self._lock = threading.Lock()  # of these three
         self._wanted: dict[str, str] = {}  # robot -> what is to be written
         self._failed: dict[str, str] = {}  # robot -> why that failed, or ""
@@ -56,8 +63,8 @@ class StopFiles:
         return [folder / _file(robot) for folder in self._folders]
 
     def read(self, robot: str) -> str:
-        """Who stopped a robot; empty without a file. A file that cannot be read stops it too, and is reported; so is
-        one of another network, which does not stop it.
+        """Who stopped a robot; empty without a file. A file that cannot be read stops it too, and
+        is reported; so is one of another network, which does not stop it.
         """
         self._last.pop(robot, None)
         found = {self._read(path, robot) for path in self.paths(robot)}
@@ -77,12 +84,15 @@ class StopFiles:
             return ""
         except (OSError, ValueError) as error:
             why = error.strerror if isinstance(error, OSError) else "it is damaged"
-            report(f"{self._reporter}: {path}: {why}, so {robot or 'the robot'} is stopped until `holozen release`")
+            report(
+                f"{self._reporter}: {path}: {why}, so {robot or 'the robot'} is stopped until "
+                "`holozen release`"
+            )
             return UNREADABLE
 
     def write(self, robot: str, by: str) -> str:
-        """Record who stopped a robot; empty: no one. Returns why that failed and what follows, or "". It is reported
-        too, once: the stop holds all the same.
+        """Record who stopped a robot; empty: no one. Returns why that failed and what follows, or
+        "". It is reported too, once: the stop holds all the same.
         """
         if not by and self._writer is None and self._is_kept(robot, by):
             return ""  # at each spawn of a robot that is not stopped, without the cost of a thread
@@ -115,18 +125,24 @@ class StopFiles:
         if self._is_kept(robot, by):
             return ""
         self._last.pop(robot, None)
-        failures = [*filter(None, [_written(path, by) for path in self.paths(robot)])]  # all are tried
+        # all are tried
+        failures = [*filter(None, [_written(path, by) for path in self.paths(robot)])]
         if not failures:
             self._last[robot] = by
             self._reported -= {(robot, True), (robot, False)}
             return ""
-        lost, left = "stops hold, but not beyond the end of this process", "the next one has the robot stopped"
+        lost, left = (
+            "stops hold, but not beyond the end of this process",
+            "the next one has the robot stopped",
+        )
         reason = f"{failures[0]}: {lost if by else left}"
         self._report(robot, by, reason)
         return reason
 
     def _is_kept(self, robot: str, by: str) -> bool:
-        return self._last.get(robot) == by and all(os.path.exists(path) == bool(by) for path in self.paths(robot))
+        return self._last.get(robot) == by and all(
+            os.path.exists(path) == bool(by) for path in self.paths(robot)
+        )
 
     def _report(self, robot: str, by: str, reason: str) -> None:
         if (robot, bool(by)) not in self._reported:
@@ -172,7 +188,9 @@ def _replace(path: Path, text: str) -> None:
 
 def _setter_in(path: Path) -> str:
     """Raises OSError or ValueError."""
-    with open(path, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK)) as file:
+    with open(
+        path, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK)
+    ) as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise ValueError
         text = file.read(MAX_BYTES).decode()

@@ -14,27 +14,44 @@ from holozen.transport.services import RING, Server
 from holozen.wire import key_for, resume_command
 
 MAX_REQUESTS = 16  # of one service answered per poll; a flood of them must not stall the steps
+# s; a command that was sent before a resume may be read so much after that was wanted
+SIMULTANEOUS = 0.05
 OUTDATED = "this {verb} may have been sent before {event}; send it again if that is still to end"
-RELEASED = "sources that commanded during the stop have to let go first; an autopilot also waits for `{resume}`"
+RELEASED = (
+    "sources that commanded during the stop have to let go first; an autopilot also waits "
+    "for `{resume}`"
+)
 
 
 class RobotServices:
-    """Serves stop, release and resume in the namespace of the key `command`, for all `arbiters` together. `changed` is
-    called with the time (s) before a stop or a release is confirmed, also for a stop of a robot that is stopped; it
-    returns what the caller should know, or "". Reports begin with `reporter`.
+    """Serves stop, release and resume in the namespace of the key `command`, for all `arbiters`
+    together. `changed` is called with the time (s) before a stop or a release is confirmed, also
+    for a stop of a robot that is stopped; it returns what the caller should know, or "". Reports
+    begin with `reporter`.
     """
 
     VERBS = ("release", "resume", "stop")
 
     def __init__(
-        self, bus: Bus, command: str, arbiters: tuple[Arbiter, ...], changed: Callable[[float], str],
+        self,
+        bus: Bus,
+        command: str,
+        arbiters: tuple[Arbiter, ...],
+        changed: Callable[[float], str],
         reporter: str = "sim",
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._arbiters, self._changed, self._reporter = arbiters, changed, reporter
         answers = (self._on_release, self._on_resume, self._on_stop)
         self._namespace = namespace = command.rpartition("/")[0]
         self._release, self._resume, self._stop = self._servers = tuple(
-            bus.serve(key_for(verb, namespace), TriggerRequest, TriggerReply, answer, dealt=True, stops=verb == "stop")
+            bus.serve(
+                key_for(verb, namespace),
+                TriggerRequest,
+                TriggerReply,
+                answer,
+                dealt=True,
+                stops=verb == "stop",
+            )
             for verb, answer in zip(self.VERBS, answers, strict=True)
         )
         in_order = (self._stop, self._release, self._resume)
@@ -43,7 +60,9 @@ class RobotServices:
         self._now = 0.0
 
     def _read(self, server: Server, request: Any, moment: Moment) -> bool:
-        """Answer `request`, the first of `server`, and those that wait at any server. Returns whether more wait."""
+        """Answer `request`, the first of `server`, and those that wait at any server. Returns
+        whether more wait.
+        """
         self._now = moment.now
         if request is not None:
             server.keep(request)
@@ -53,10 +72,13 @@ class RobotServices:
     def _answer(self) -> None:
         if self._stop.take_in():  # a stop wins over requests that wait with it
             for server in (self._release, self._resume):
-                server.take_in(RING)  # before the stop is confirmed: a release sent after that counts
+                # before the stop is confirmed: a release sent after that counts
+                server.take_in(RING)
             self._stop.answer_pending(MAX_REQUESTS)
             for server in (self._release, self._resume):
-                server.refuse_waiting(f"a stop came at the same time; {self._namespace or 'the robot'} is stopped")
+                server.refuse_waiting(
+                    f"a stop came at the same time; {self._namespace or 'the robot'} is stopped"
+                )
         for server in (self._release, self._resume):
             server.answer_pending(MAX_REQUESTS)
 
@@ -66,8 +88,8 @@ class RobotServices:
             server.close()
 
     @property
-    def _setter(self) -> str:
-        return self._arbiters[0].software_stop.setter
+    def _setter(self) -> str | None:
+        return self._arbiters[0].stopped_by
 
     def _on_stop(self, _request: TriggerRequest) -> TriggerReply:
         before = self._setter
@@ -75,32 +97,44 @@ class RobotServices:
             arbiter.stop(self._stop.caller, self._now)
         if not before:
             self._report(f"is stopped by {self._setter}")
-        problem = f"; the request cannot be read: {self._stop.problem}" if self._stop.problem else ""
+        problem = (
+            f"; the request cannot be read: {self._stop.problem}" if self._stop.problem else ""
+        )
         return TriggerReply(True, f"stopped by {self._setter}{problem}{self._change()}")
 
     def _on_release(self, _request: TriggerRequest) -> TriggerReply:
         if not self._setter:
             return TriggerReply(True, "the robot was not stopped")
-        stopped = max(arbiter.stopped_at for arbiter in self._arbiters)
-        self._require_sent_after(self._release, stopped, f"the last stop of {self._namespace or 'the robot'}")
+        stopped = [arbiter.stopped_at for arbiter in self._arbiters]
+        self._require_sent_after(
+            self._release, stopped, f"the last stop of {self._namespace or 'the robot'}"
+        )
         for arbiter in self._arbiters:
             arbiter.release(self._now)
         self._report(f"was released by {self._release.caller or 'an unknown caller'}")
-        return TriggerReply(True, f"{RELEASED.format(resume=resume_command(self._namespace))}{self._change()}")
+        return TriggerReply(
+            True, f"{RELEASED.format(resume=resume_command(self._namespace))}{self._change()}"
+        )
 
     def _on_resume(self, _request: TriggerRequest) -> TriggerReply:
         refusals = [arbiter.resume_refusal(self._now) for arbiter in self._arbiters]
-        if reason := next(filter(None, refusals), ""):  # if one arbiter refuses, none of them resumes
+        # if one arbiter refuses, none of them resumes
+        if reason := next(filter(None, refusals), ""):
             raise ServiceError(reason)
-        taken = max(arbiter.taken_at for arbiter in self._arbiters)
-        self._require_sent_after(self._resume, taken, f"a source took over or stopped {self._namespace or 'the robot'}")
+        taken = [
+            at and at - SIMULTANEOUS for at in (arbiter.taken_at for arbiter in self._arbiters)
+        ]
+        self._require_sent_after(
+            self._resume, taken, f"a source took over or stopped {self._namespace or 'the robot'}"
+        )
         for arbiter in self._arbiters:
             arbiter.resume(self._now)
         return TriggerReply(True, "every source may drive")
 
-    def _require_sent_after(self, server: Server, event: float, what: str) -> None:
+    def _require_sent_after(self, server: Server, events: list[float | None], what: str) -> None:
         verb = "release" if server is self._release else "resume"
-        server.require_sent_after(event, self._now, OUTDATED.format(verb=verb, event=what))
+        for event in events:
+            server.require_sent_after(event, OUTDATED.format(verb=verb, event=what))
 
     def _report(self, what: str) -> None:
         report(f"{self._reporter}: {self._namespace or 'the robot'} {what}")

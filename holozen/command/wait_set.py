@@ -17,7 +17,9 @@ class ReadTimes:
         self._trusted_from = 0.0
 
     def since(self, now: float) -> float:
-        """Record that commands are read at `now` (s). Returns the earliest time at which they can have arrived."""
+        """Record that commands are read at `now` (s). Returns the earliest time at which they can
+        have arrived.
+        """
         if now - self._last > STALL:
             self._before_stall, self._trusted_from = self._last, now + DISTRUST
         since = self._last if now >= self._trusted_from else self._before_stall
@@ -26,8 +28,8 @@ class ReadTimes:
 
 
 class Moment(NamedTuple):
-    """The time `now` at which keys are read. What waits there arrived at or after `since`; a stamp in its header may be
-    of any of the `clocks`, given by their present times. All in s.
+    """The time `now` at which keys are read. What waits there arrived at or after `since`; a stamp
+    in its header may be of any of the `clocks`, given by their present times. All in s.
     """
 
     now: float
@@ -36,8 +38,9 @@ class Moment(NamedTuple):
 
 
 class Reader(NamedTuple):
-    """Reads a `channel`: Zenoh's, or a Ring. `read` is called with the first sample or request that waits there, or
-    None, and processes it with all others. It returns whether it has to be called again even if nothing more arrives.
+    """Reads a `channel`: Zenoh's, or a Ring. `read` is called with the first sample or request that
+    waits there, or None, and processes it with all others. It returns whether it has to be called
+    again even if nothing more arrives.
     """
 
     channel: Any
@@ -71,8 +74,9 @@ class WaitSet:
         self._unfinished = [reader for reader in self._unfinished if id(reader.channel) not in gone]
 
     def read(self, moment: Moment) -> None:
-        """Read what waits, in the order in which the keys were added. A key is read as soon as it is found to have
-        something, since a request may depend on another one that arrives meanwhile.
+        """Read what waits, in the order in which the keys were added. A key is read as soon as it
+        is found to have something, since a request may depend on another one that arrives
+        meanwhile.
         """
         self._unfinished = [reader for reader in self._unfinished if reader.read(None, moment)]
         for dealer in list(self._dealers):

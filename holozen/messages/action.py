@@ -13,21 +13,31 @@ from holozen.messages.message import Int8, Message
 
 
 class ActionPart(Message):
-    """A message of an action. Its class is named after the action and the part: NavigateToPoseGoal."""
+    """A message of an action. Its class is named after the action and the part:
+    NavigateToPoseGoal.
+    """
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         package, _, name = cls.ROS.replace("/srv/", "/msg/").partition("/msg/")
         if not name.endswith(("_SendGoal", "_GetResult")):  # a service has its underscore already
-            part = next(part for part in ("FeedbackMessage", "Goal", "Result", "Feedback") if name.endswith(part))
+            part = next(
+                part
+                for part in ("FeedbackMessage", "Goal", "Result", "Feedback")
+                if name.endswith(part)
+            )
             name = f"{name.removesuffix(part)}_{part}"
         cls.ROS = f"{package}/action/{name}"
 
 
 class Action:
-    """An action of Structs: `Goal`, `Result`, `Feedback`, and in `Impl` the messages that carry them."""
+    """An action of Structs: `Goal`, `Result`, `Feedback`, and in `Impl` the messages that carry
+    them.
+    """
 
-    def __init__(self, goal: type[ActionPart], result: type[ActionPart], feedback: type[ActionPart]) -> None:
+    def __init__(
+        self, goal: type[ActionPart], result: type[ActionPart], feedback: type[ActionPart]
+    ) -> None:
         self.Goal, self.Result, self.Feedback = goal, result, feedback
         self.ROS = goal.ROS.removesuffix("_Goal")
 
@@ -51,7 +61,8 @@ class Action:
 
     def _made(self, ending: str, **fields: Any) -> Any:
         described = [
-            (name, kind, msgspec.field(default_factory=int if kind is Int8 else kind)) for name, kind in fields.items()
+            (name, kind, msgspec.field(default_factory=int if kind is Int8 else kind))
+            for name, kind in fields.items()
         ]
         name = self.ROS.rpartition("/")[2] + ending
         return msgspec.defstruct(name, described, bases=(ActionPart,), module=self.Goal.__module__)

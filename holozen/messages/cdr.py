@@ -1,11 +1,13 @@
-"""CDR, the bytes of ROS 2: the classic encoding of DDS (XCDR1), written in little endian and read in both byte orders.
+"""CDR, the bytes of ROS 2: the classic encoding of DDS (XCDR1), written in little endian and read
+in both byte orders.
 
-Two bytes give the byte order and two are unused; then come the fields, each aligned to its own size, counted from
-there (OMG DDSI-RTPS 2.5, 10.2; OMG CORBA 3.4 part 2, 9.3). An empty message takes one byte, as in ROS 2.
+Two bytes give the byte order and two are unused; then come the fields, each aligned to its own
+size, counted from there (OMG DDSI-RTPS 2.5, 10.2; OMG CORBA 3.4 part 2, 9.3). An empty message
+takes one byte, as in ROS 2.
 
-The functions that read and write a type are generated. Fields of fixed size form runs, each one call of `struct`; a
-text or a sequence ends a run. As the alignment of a run is known only at run time, it has eight layouts, one for each
-position within eight bytes.
+The functions that read and write a type are generated. Fields of fixed size form runs, each one
+call of `struct`; a text or a sequence ends a run. As the alignment of a run is known only at run
+time, it has eight layouts, one for each position within eight bytes.
 """
 
 import struct
@@ -18,7 +20,14 @@ from math import isfinite
 from typing import Any
 
 from holozen.messages import CodecError
-from holozen.messages.definitions import TYPECODES, Field, Interface, InterfaceError, completed, element_size
+from holozen.messages.definitions import (
+    TYPECODES,
+    Field,
+    Interface,
+    InterfaceError,
+    completed,
+    element_size,
+)
 from holozen.suggest import article
 
 HEADER = b"\x00\x01\x00\x00"  # classic CDR, little endian
@@ -42,7 +51,9 @@ def read(interface: Interface, payload: bytes) -> dict[str, Any]:
 
 
 def write(interface: Interface, value: Any) -> bytes:
-    """The bytes of a message given as plain values; missing fields are at their defaults. Raises CodecError."""
+    """The bytes of a message given as plain values; missing fields are at their defaults. Raises
+    CodecError.
+    """
     try:
         return plain(interface).write(completed(interface, value))[0]
     except InterfaceError as error:
@@ -50,7 +61,8 @@ def write(interface: Interface, value: Any) -> bytes:
 
 
 class Shape:
-    """How generated code accesses values: by default a message is a dict. `names` are used by its expressions.
+    """How generated code accesses values: by default a message is a dict. `names` are used by its
+    expressions.
 
     With `arrays`, sequences of numbers are read as arrays, else as lists.
     """
@@ -85,8 +97,15 @@ class Codec:
         """The value in `payload`. Raises CodecError."""
         order = ORDERS.get(payload[:2])
         if order is None or len(payload) < len(HEADER):
-            start = f"{len(payload)} bytes that begin with {payload[:2].hex(' ')}" if payload else "no bytes"
-            raise CodecError(f"not {article(self._name)}: {start}; CDR begins with 00 00 or 00 01 and two more bytes")
+            start = (
+                f"{len(payload)} bytes that begin with {payload[:2].hex(' ')}"
+                if payload
+                else "no bytes"
+            )
+            raise CodecError(
+                f"not {article(self._name)}: {start}; CDR begins with 00 00 or 00 01 and two more "
+                "bytes"
+            )
         if len(payload) == len(HEADER) and not self.interface.fields:
             payload += b"\0"  # other libraries write no byte for an empty message
         try:
@@ -94,9 +113,13 @@ class Codec:
                 self._readers[order] = reader(self.interface, self._shape, order)
             value, end = self._readers[order](payload, len(HEADER), len(payload))
         except struct.error:
-            raise CodecError(f"not {article(self._name)}: cut off after {len(payload)} bytes") from None
+            raise CodecError(
+                f"not {article(self._name)}: cut off after {len(payload)} bytes"
+            ) from None
         except UnicodeDecodeError as error:
-            raise CodecError(f"not {article(self._name)}: a text is not UTF-8: {error.reason}") from None
+            raise CodecError(
+                f"not {article(self._name)}: a text is not UTF-8: {error.reason}"
+            ) from None
         except ValueError as error:
             raise CodecError(f"not {article(self._name)}: {error}") from None
         if len(payload) - end > PADDING:
@@ -132,7 +155,9 @@ def reader(interface: Interface, shape: Shape, order: str) -> Read:
 
 
 def writer(interface: Interface, shape: Shape) -> Write:
-    """A function that appends the parts of a message to `out`, and to `odd` the values that may not be finite."""
+    """A function that appends the parts of a message to `out`, and to `odd` the values that may not
+    be finite.
+    """
     made: Write = _Writing(shape, "<").function(interface)
     return made
 
@@ -148,7 +173,11 @@ class _Body:
         self._numbers = count()
 
     def compiled(self, interface: Interface, arguments: str, result: str) -> Any:
-        lines = [f"def made({arguments}):", *(f" {line}" for line in self.lines), f" return {result}"]
+        lines = [
+            f"def made({arguments}):",
+            *(f" {line}" for line in self.lines),
+            f" return {result}",
+        ]
         names = {**self._names, **self.shape.names}
         exec(compile("\n".join(lines), f"<CDR of {interface.name}>", "exec"), names)
         return names["made"]
@@ -171,7 +200,9 @@ class _Body:
     def in_run(self, field: Field) -> bool:
         """Whether a field has a fixed size, so that it was added to the run."""
         if field.type == "wstring":
-            raise InterfaceError(f"{field.name}: the implementations of ROS 2 do not agree on how to write a wstring")
+            raise InterfaceError(
+                f"{field.name}: the implementations of ROS 2 do not agree on how to write a wstring"
+            )
         if field.type not in CODES or field.array not in ("", "fixed"):
             return False
         self.run.append((CODES[field.type], field.bound or 1))
@@ -196,7 +227,11 @@ class _Reading(_Body):
             return self.message(field.nested)
         at = sum(many for code, many in self.run if code != "x")
         if self.in_run(field):
-            return f"list({self._values}[{at}:{at + field.bound}])" if field.array else f"{self._values}[{at}]"
+            return (
+                f"list({self._values}[{at}:{at + field.bound}])"
+                if field.array
+                else f"{self._values}[{at}]"
+            )
         self.end_run()
         value = self.fresh()
         self.lines.append(f"{value}, p = {self.named(self.call(field))}(b, p, e)")
@@ -211,12 +246,20 @@ class _Reading(_Body):
         one = reader(field.nested, self.shape, self.order) if field.nested else text
         if field.array == "fixed":
             return partial(read_row, one, field.bound)
-        return partial(read_many, self.order, one, element_size(field), field.bound) if field.array else one
+        return (
+            partial(read_many, self.order, one, element_size(field), field.bound)
+            if field.array
+            else one
+        )
 
     def end_run(self) -> None:
         if self.run:
             table = [(layout.unpack_from, layout.size) for layout in layouts(self.order, self.run)]
-            self.lines += [f"u, n = {self.named(table)}[p & 7]", f"{self._values} = u(b, p)", "p += n"]
+            self.lines += [
+                f"u, n = {self.named(table)}[p & 7]",
+                f"{self._values} = u(b, p)",
+                "p += n",
+            ]
             self.run, self._values = [], self.fresh()
 
 
@@ -248,7 +291,9 @@ class _Writing(_Body):
     def call(self, field: Field) -> Any:
         if field.type in CODES:
             return partial(write_numbers, CODES[field.type], field.bound)
-        one = writer(field.nested, self.shape) if field.nested else partial(write_text, field.longest)
+        one = (
+            writer(field.nested, self.shape) if field.nested else partial(write_text, field.longest)
+        )
         if field.array == "fixed":
             return partial(write_row, one, field.bound)
         return partial(write_many, one, field.bound) if field.array else one
@@ -257,7 +302,12 @@ class _Writing(_Body):
         if self.run:
             table = [(layout.pack, layout.size) for layout in layouts("<", self.run)]
             items = "".join(f"{item}, " for item in self._items)
-            self.lines += [f"u, n = {self.named(table)}[p & 7]", f"v = ({items})", "out.append(u(*v))", "p += n"]
+            self.lines += [
+                f"u, n = {self.named(table)}[p & 7]",
+                f"v = ({items})",
+                "out.append(u(*v))",
+                "p += n",
+            ]
             if any(code in "fd" for code, _ in self.run):
                 self.lines.append("isfinite(sum(v)) or odd.append(v)")
             self.run, self._items = [], []
@@ -295,14 +345,17 @@ def read_text(order: str, longest: int, b: bytes, p: int, e: int) -> tuple[str, 
         return "", p  # some libraries write no NUL for an empty text
     if n > e - p or b[p + n - 1]:
         raise ValueError(
-            f"a text of {n} bytes {'that does not end in NUL' if n <= e - p else f'where {e - p} are left'}"
+            f"a text of {n} bytes "
+            f"{'that does not end in NUL' if n <= e - p else f'where {e - p} are left'}"
         )
     if longest and n > longest + 1:
         raise ValueError(f"a text of {n - 1} bytes; at most {longest}")
     return b[p : p + n - 1].decode(), p + n
 
 
-def read_numbers(order: str, code: str, bound: int, b: bytes, p: int, e: int) -> tuple[list[Any], int]:
+def read_numbers(
+    order: str, code: str, bound: int, b: bytes, p: int, e: int
+) -> tuple[list[Any], int]:
     """A sequence of numbers."""
     n, p, end = _read_span(order, code, bound, b, p, e)
     if code == "B":
@@ -310,7 +363,9 @@ def read_numbers(order: str, code: str, bound: int, b: bytes, p: int, e: int) ->
     return list(struct.unpack_from(f"{order}{n}{code}", b, p)), end
 
 
-def read_array(order: str, code: str, bound: int, b: bytes, p: int, e: int) -> tuple["array[Any]", int]:
+def read_array(
+    order: str, code: str, bound: int, b: bytes, p: int, e: int
+) -> tuple["array[Any]", int]:
     """A sequence of numbers, as an array."""
     _, p, end = _read_span(order, code, bound, b, p, e)
     made: array[Any] = array(code)
@@ -320,7 +375,9 @@ def read_array(order: str, code: str, bound: int, b: bytes, p: int, e: int) -> t
     return made, end
 
 
-def read_many(order: str, read: Read, least: int, bound: int, b: bytes, p: int, e: int) -> tuple[list[Any], int]:
+def read_many(
+    order: str, read: Read, least: int, bound: int, b: bytes, p: int, e: int
+) -> tuple[list[Any], int]:
     """A sequence of texts or messages."""
     n, p = _read_length(order, bound, least, b, p, e)
     return read_row(read, n, b, p, e)
@@ -369,7 +426,9 @@ def write_text(longest: int, text: str, p: int, out: list[bytes], _odd: list[Any
     return p + gap + len(data) + 5
 
 
-def write_numbers(code: str, bound: int, values: Sequence[Any], p: int, out: list[bytes], odd: list[Any]) -> int:
+def write_numbers(
+    code: str, bound: int, values: Sequence[Any], p: int, out: list[bytes], odd: list[Any]
+) -> int:
     """A sequence of numbers, and where it ended."""
     p, n, size = _write_length(bound, values, p, out), len(values), SIZES[code]
     gap = pad(p, size) if n else 0
@@ -385,12 +444,16 @@ def _packed(code: str, values: Sequence[Any]) -> bytes:
     return struct.pack(f"<{len(values)}{code}", *values)
 
 
-def write_many(write: Write, bound: int, values: Sequence[Any], p: int, out: list[bytes], odd: list[Any]) -> int:
+def write_many(
+    write: Write, bound: int, values: Sequence[Any], p: int, out: list[bytes], odd: list[Any]
+) -> int:
     """A sequence of texts or messages, and where it ended."""
     return write_row(write, len(values), values, _write_length(bound, values, p, out), out, odd)
 
 
-def write_row(write: Write, n: int, values: Sequence[Any], p: int, out: list[bytes], odd: list[Any]) -> int:
+def write_row(
+    write: Write, n: int, values: Sequence[Any], p: int, out: list[bytes], odd: list[Any]
+) -> int:
     """`n` texts or messages, and where they ended."""
     for value in sized(values, n):
         p = write(value, p, out, odd)

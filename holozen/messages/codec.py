@@ -1,4 +1,4 @@
-"""Encodes and decodes messages: JSON, msgpack or CDR, by the Zenoh Encoding that travels with the bytes."""
+"""Encodes and decodes messages: JSON or CDR, by the Zenoh Encoding that travels with the bytes."""
 
 import threading
 from collections.abc import Callable
@@ -17,9 +17,18 @@ if TYPE_CHECKING:
     from holozen.messages.definitions import Interface
 
 __all__ = [
-    "WIRES", "CodecError", "convert", "decode", "decoder", "encode", "encoding", "form", "transcoded", "writer",
+    "WIRES",
+    "CodecError",
+    "convert",
+    "decode",
+    "decoder",
+    "encode",
+    "encoding",
+    "form",
+    "transcoded",
+    "writer",
     "written",
-]  # fmt: skip
+]
 
 M = TypeVar("M", bound=Message)
 Makers = tuple[tuple[type[M], Callable[[Any], M]], ...]
@@ -27,14 +36,14 @@ Makers = tuple[tuple[type[M], Callable[[Any], M]], ...]
 # Encodings that do not describe the content, or mean JSON, which is what people write by hand.
 JSON = {"", "zenoh/bytes", "zenoh/string", "text/plain", "text/json", "application/json"}
 
-LONGEST = 200  # characters of a reason
+MAX_REASON = 200  # characters of a reason
 N, U = ord("n"), ord("u")
 UNTYPED = (
-    "CDR without its Encoding, so of no certain type; what a bridge to ROS 2 sends comes in by `holozen ros2 --bridge`"
+    "CDR without its Encoding, so of no certain type; what a bridge to ROS 2 sends comes in "
+    "by `holozen ros2 --bridge`"
 )
 
 _encode_json = msgspec.json.Encoder(enc_hook=listed).encode
-_encode_msgpack = msgspec.msgpack.Encoder(enc_hook=listed).encode
 
 
 def encode(message: Message, wire: str = "json") -> bytes:
@@ -49,7 +58,9 @@ def encode(message: Message, wire: str = "json") -> bytes:
 
 
 def written(message: Message, wire: str) -> tuple[bytes, str]:
-    """The bytes of `message`, and their wire: CDR for one with ANY_NUMBER that holds a NaN or an infinity."""
+    """The bytes of `message`, and their wire: CDR for one with ANY_NUMBER that holds a NaN or an
+    infinity.
+    """
     if not message.ANY_NUMBER or wire == "cdr":
         return encode(message, wire), wire
     payload, finite = _write(message, wire)
@@ -66,18 +77,17 @@ def written(message: Message, wire: str) -> tuple[bytes, str]:
 
 
 def writer(kind: type[M], wire: str, checks: bool) -> Callable[[M], tuple[bytes, str | None]]:
-    """A function that returns the bytes of a message of `kind`, and their Encoding if it is not that of `wire`. If it
-    `checks`, it raises CodecError for a field with a value of another type: JSON and msgpack write what they are given,
-    and only a reader would find it.
+    """A function that returns the bytes of a message of `kind`, and their Encoding if it is not
+    that of `wire`. If it `checks`, it raises CodecError for a field with a value of another type:
+    JSON writes what it is given, and only a reader would find it.
     """
-    parsers = {each: _decoders((kind,), WIRES[each], each)[0][1] for each in ("json", "msgpack") if checks}
-    parse_json = parsers.get("json")
+    parse_json = _decoders((kind,), WIRES["json"], "json")[0][1] if checks else None
 
     def write(message: M) -> tuple[bytes, str | None]:
         payload, used = written(message, wire)
-        if parse := parsers.get(used):  # CDR's writer checks
+        if parse_json and used == "json":  # CDR's writer checks
             try:
-                parse(payload)
+                parse_json(payload)
             except (msgspec.DecodeError, CodecError):  # the long way has the reason
                 decode(payload, WIRES[used], (kind,))
         return payload, None if used == wire else encoding(used, type(message))
@@ -89,7 +99,8 @@ def writer(kind: type[M], wire: str, checks: bool) -> Callable[[M], tuple[bytes,
                 parse_json(payload)
         except (UnicodeEncodeError, msgspec.DecodeError, CodecError):
             return write(message)  # the long way has the reason
-        # One byte is found ten times faster than four, and most messages have at most one of these, in "angular".
+        # One byte is found ten times faster than four, and most messages have at most one of these,
+        # in "angular".
         before, _, after = payload.partition(b"u")
         if (U not in after and before[-1] != N) or not _has_null(payload):
             return payload, None
@@ -105,7 +116,9 @@ def _write(message: Message, wire: str) -> tuple[bytes, bool]:
             message.SETTLE()
         return _WRITERS[wire](message)
     except UnicodeEncodeError as error:
-        raise CodecError(f"{type(message).__name__}: a text is not Unicode: {error.reason}") from None
+        raise CodecError(
+            f"{type(message).__name__}: a text is not Unicode: {error.reason}"
+        ) from None
 
 
 def encoding(wire: str, kind: type[Message]) -> str:
@@ -114,7 +127,8 @@ def encoding(wire: str, kind: type[Message]) -> str:
 
 
 def decode(payload: bytes, encoding: str, types: tuple[type[M], ...], tolerant: bool = False) -> M:
-    """The message in `payload`, of the first of `types` that fits. Raises CodecError with the reason.
+    """The message in `payload`, of the first of `types` that fits. Raises CodecError with the
+    reason.
 
     Unknown fields are refused, or ignored if `tolerant` (`wire.is_command` has the rule).
     """
@@ -125,8 +139,7 @@ def decode(payload: bytes, encoding: str, types: tuple[type[M], ...], tolerant: 
     except CodecError:
         if not tolerant or wire == "cdr":
             raise
-    parse = (msgspec.json if wire == "json" else msgspec.msgpack).decode
-    return _first(tuple((kind, partial(_without_unknown, kind, parse)) for kind in types), payload)
+    return _first(tuple((kind, partial(_without_unknown, kind)) for kind in types), payload)
 
 
 class Encoded(Protocol):
@@ -141,8 +154,8 @@ class Encoded(Protocol):
 def decoder(types: tuple[type[M], ...], tolerant: bool = False) -> Callable[[Encoded], M]:
     """`decode` for these types, faster for the first one in JSON.
 
-    If `tolerant`, an object in JSON is read whatever its Encoding says: to ask takes as long as to decode a Twist. If
-    not, CDR without its Encoding is refused.
+    If `tolerant`, an object in JSON is read whatever its Encoding says: to ask takes as long as to
+    decode a Twist. If not, CDR without its Encoding is refused.
     """
     first: Callable[[bytes], M] = _decoders(types, "", "json")[0][1]
 
@@ -160,10 +173,11 @@ def decoder(types: tuple[type[M], ...], tolerant: bool = False) -> Callable[[Enc
     return read
 
 
-def _without_unknown(kind: type[M], plain: Callable[[bytes], Any], payload: bytes) -> M:
-    value = plain(payload)
+def _without_unknown(kind: type[M], payload: bytes) -> M:
+    value = msgspec.json.decode(payload)
     known = _known(kind, value)
-    return msgspec.convert(known or value, kind)  # an object with unknown fields alone is another message
+    # an object with unknown fields alone is another message
+    return msgspec.convert(known or value, kind)
 
 
 def _known(hint: Any, value: Any) -> Any:
@@ -172,18 +186,22 @@ def _known(hint: Any, value: Any) -> Any:
         return [_known(get_args(hint)[0], inner) for inner in value]
     if isinstance(value, dict) and isinstance(hint, type) and issubclass(hint, Message):
         fields = _fields(hint)
-        return {name: _known(fields[name], inner) for name, inner in value.items() if name in fields}
+        return {
+            name: _known(fields[name], inner) for name, inner in value.items() if name in fields
+        }
     return value
 
 
 @lru_cache(maxsize=256)
 def _fields(kind: type[Message]) -> dict[str, Any]:
-    return {name: hint for name, hint in get_type_hints(kind).items() if name in kind.__struct_fields__}
+    return {
+        name: hint for name, hint in get_type_hints(kind).items() if name in kind.__struct_fields__
+    }
 
 
 def convert(value: Any, types: tuple[type[M], ...], strict: bool = False) -> M:
-    """`decode` for the dicts, lists and numbers of parsed JSON or YAML. Unknown fields are refused; if `strict`, so are
-    texts in place of numbers.
+    """`decode` for the dicts, lists and numbers of parsed JSON or YAML. Unknown fields are refused;
+    if `strict`, so are texts in place of numbers.
     """
     _decoders(types, "", "json")  # prepares the types
     makers = tuple((kind, partial(msgspec.convert, type=kind, strict=strict)) for kind in types)
@@ -201,12 +219,14 @@ def _first(makers: Makers[M], value: Any) -> M:
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             reasons.append(_short(f"not {article(kind.__name__)}: {error}"))
     # A message with a header was meant as the stamped type.
-    raise CodecError(next((reason for reason in reasons if "field `header`" not in reason), reasons[0]))
+    raise CodecError(
+        next((reason for reason in reasons if "field `header`" not in reason), reasons[0])
+    )
 
 
 def _short(text: str) -> str:
     """One line: a field's name in it came over the wire and may be anything."""
-    return shorten(printable(text), LONGEST)
+    return shorten(printable(text), MAX_REASON)
 
 
 def _write_json(message: Message) -> tuple[bytes, bool]:
@@ -215,13 +235,14 @@ def _write_json(message: Message) -> tuple[bytes, bool]:
 
 
 def _has_null(payload: bytes) -> bool:
-    """Whether JSON may hold a NaN or an infinity, which msgspec writes as null; no message has one otherwise."""
+    """Whether JSON may hold a NaN or an infinity, which msgspec writes as null; no message has one
+    otherwise.
+    """
     return b"null" in payload
 
 
 _WRITERS: dict[str, Callable[[Message], tuple[bytes, bool]]] = {
     "json": _write_json,
-    "msgpack": lambda message: (_encode_msgpack(message), False),
     "cdr": lambda message: _structs().write(message),
 }
 
@@ -235,9 +256,8 @@ def _decoders(types: tuple[type[M], ...], encoding: str, form: str) -> Makers[M]
     if form == "cdr":
         kinds = _named(types, encoding.partition(";")[2])
         return tuple((kind, _structs().codec(kind).read) for kind in kinds)
-    module = msgspec.json if form == "json" else msgspec.msgpack
     with _preparing:
-        return tuple((kind, module.Decoder(kind).decode) for kind in types)
+        return tuple((kind, msgspec.json.Decoder(kind).decode) for kind in types)
 
 
 def _named(types: tuple[type[M], ...], schema: str) -> tuple[type[M], ...]:
@@ -256,7 +276,7 @@ def _named(types: tuple[type[M], ...], schema: str) -> tuple[type[M], ...]:
 
 
 def form(payload: bytes, encoding: str) -> str:
-    """The wire of a payload: "json", "msgpack" or "cdr". Raises CodecError for any other Encoding."""
+    """The wire of a payload: "json" or "cdr". Raises CodecError for any other Encoding."""
     name = encoding.partition(";")[0]  # a schema may follow
     if name in JSON:
         # Bridges to ROS 2 write CDR without an Encoding; no text begins with a NUL.
@@ -268,7 +288,7 @@ def form(payload: bytes, encoding: str) -> str:
 
 
 def transcoded(interface: "Interface", payload: bytes, encoding: str) -> bytes:
-    """A message in JSON, msgpack or CDR, in CDR. Raises CodecError."""
+    """A message in JSON or CDR, in CDR. Raises CodecError."""
     from holozen.messages import cdr
 
     wire = form(payload, encoding)
@@ -276,7 +296,7 @@ def transcoded(interface: "Interface", payload: bytes, encoding: str) -> bytes:
         cdr.read(interface, payload)
         return payload
     try:
-        value: Any = (msgspec.json if wire == "json" else msgspec.msgpack).decode(payload)
+        value: Any = msgspec.json.decode(payload)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise CodecError(_short(str(error))) from None
     return cdr.write(interface, value)

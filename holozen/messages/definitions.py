@@ -1,7 +1,9 @@
-"""Types as .msg, .srv and .action files define them, parsed from their text; values as plain dicts, lists and numbers.
+"""Types as .msg, .srv and .action files define them, parsed from their text; values as plain dicts,
+lists and numbers.
 
-The parser is written by hand, since the grammar is one line per field, libraries for it (rosbags, rosidl) need numpy or
-ROS, and `topic echo` has to start at once. The spellings of ROS 1 are read too: Header, time and duration.
+The parser is written by hand, since the grammar is one line per field, libraries for it (rosbags,
+rosidl) need numpy or ROS, and `topic echo` has to start at once. The spellings of ROS 1 are read
+too: Header, time and duration.
 """
 
 import json
@@ -33,9 +35,18 @@ LARGEST_ARRAY = 2**32 - 1  # elements, as many as CDR can count
 OLD = {"time": "builtin_interfaces/Time", "duration": "builtin_interfaces/Duration"}
 FLOAT32 = 3.4028235677973366e38  # from here up a number rounds to infinity as a float32 (IEEE 754)
 TYPECODES = {
-    "char": "B", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "int64": "q",
-    "uint64": "Q", "float32": "f", "float64": "d",
-}  # fmt: skip
+    "char": "B",
+    "int8": "b",
+    "uint8": "B",
+    "int16": "h",
+    "uint16": "H",
+    "int32": "i",
+    "uint32": "I",
+    "int64": "q",
+    "uint64": "Q",
+    "float32": "f",
+    "float64": "d",
+}
 """The typecodes (of `array` and `struct`) of those numbers that have one."""
 
 _WORD = r"[A-Za-z][A-Za-z0-9_]*"
@@ -55,14 +66,18 @@ _SIZES = {"bool": 1, "byte": 1, "string": 4, "wstring": 4} | {
 
 
 class InterfaceError(Failure, ValueError):
-    """An unknown type, a malformed definition, or a value that does not fit its field. The text is one line."""
+    """An unknown type, a malformed definition, or a value that does not fit its field. The text is
+    one line.
+    """
 
 
 class Field(NamedTuple):
-    """One field. `type` is a primitive of ROS, or the full name of a message, which is then in `nested`.
+    """One field. `type` is a primitive of ROS, or the full name of a message, which is then in
+    `nested`.
 
-    `array` is empty for a single value, else "fixed" (`bound` elements), "bounded" (at most `bound`) or "sequence".
-    `longest` is N of a `string<=N`, 0 without. `default` is None where the definition gives none.
+    `array` is empty for a single value, else "fixed" (`bound` elements), "bounded" (at most
+    `bound`) or "sequence". `longest` is N of a `string<=N`, 0 without. `default` is None where the
+    definition gives none.
     """
 
     name: str
@@ -77,12 +92,20 @@ class Field(NamedTuple):
         """The type as a .msg file of `package` writes it, such as `float64[36]`."""
         home, _, rest = self.type.partition("/msg/")
         name = self.type if not rest else rest if home == package else f"{home}/{rest}"
-        ends = {"": "", "fixed": f"[{self.bound}]", "bounded": f"[<={self.bound}]", "sequence": "[]"}
+        ends = {
+            "": "",
+            "fixed": f"[{self.bound}]",
+            "bounded": f"[<={self.bound}]",
+            "sequence": "[]",
+        }
         return name + (f"<={self.longest}" if self.longest else "") + ends[self.array]
 
     def line(self, package: str = "") -> str:
         """Its line in a .msg file of `package`."""
-        return f"{self.spelled(package)} {self.name}{'' if self.default is None else f' {_written(self.default)}'}"
+        return (
+            f"{self.spelled(package)} "
+            f"{self.name}{'' if self.default is None else f' {_written(self.default)}'}"
+        )
 
 
 class Constant(NamedTuple):
@@ -101,18 +124,33 @@ def _written(value: Any) -> str:
     """A value as a .msg file has it. Texts are in quotes: some are empty, or have a `#`."""
     if isinstance(value, list):
         return f"[{', '.join(map(_written, value))}]"
-    return '"' + re.sub(r'["\\]', r"\\\g<0>", value) + '"' if isinstance(value, str) else json.dumps(value)
+    return (
+        '"' + re.sub(r'["\\]', r"\\\g<0>", value) + '"'
+        if isinstance(value, str)
+        else json.dumps(value)
+    )
 
 
 class Interface:
-    """A message type; or a service type, which has a `request` and a `response`, or an action type, which has `parts`;
-    neither of them has fields of its own.
+    """A message type; or a service type, which has a `request` and a `response`, or an action type,
+    which has `parts`; neither of them has fields of its own.
 
-    `kind` is "msg", "srv" or "action". The messages of a service are messages: `std_srvs/srv/Trigger_Request`. Those of
-    an action, and its two services, are its `parts`, see `action_parts`.
+    `kind` is "msg", "srv" or "action". The messages of a service are messages:
+    `std_srvs/srv/Trigger_Request`. Those of an action, and its two services, are its `parts`, see
+    `action_parts`.
     """
 
-    __slots__ = ("constants", "fields", "kind", "least", "name", "parts", "request", "response", "width")
+    __slots__ = (
+        "constants",
+        "fields",
+        "kind",
+        "least",
+        "name",
+        "parts",
+        "request",
+        "response",
+        "width",
+    )
 
     def __init__(
         self,
@@ -122,13 +160,21 @@ class Interface:
         constants: tuple[Constant, ...] = (),
         parts: "tuple[Interface, ...]" = (),
     ) -> None:
-        self.name, self.kind, self.fields, self.constants, self.parts = name, kind, fields, constants, parts
+        self.name, self.kind, self.fields, self.constants, self.parts = (
+            name,
+            kind,
+            fields,
+            constants,
+            parts,
+        )
         self.request = parts[0] if kind == "srv" else None
         self.response = parts[1] if kind == "srv" else None
         self.least: int = max(1, sum(map(_field_size, fields)))  # bytes; an empty message has one
         self.width: int = 1 + sum(field.nested.width if field.nested else 1 for field in fields)
         if self.least > LARGEST or self.width > MAX_FIELDS:
-            raise InterfaceError(f"{name} is too large: at least {self.least} bytes and {self.width} fields")
+            raise InterfaceError(
+                f"{name} is too large: at least {self.least} bytes and {self.width} fields"
+            )
 
     @property
     def package(self) -> str:
@@ -142,7 +188,11 @@ def element_size(field: Field) -> int:
 
 
 def _field_size(field: Field) -> int:
-    return 4 if field.array in ("sequence", "bounded") else element_size(field) * (field.bound if field.array else 1)
+    return (
+        4
+        if field.array in ("sequence", "bounded")
+        else element_size(field) * (field.bound if field.array else 1)
+    )
 
 
 class PlacedError(InterfaceError):
@@ -150,7 +200,9 @@ class PlacedError(InterfaceError):
 
 
 ACTION_PARTS = ("Goal", "Result", "Feedback", "FeedbackMessage", "SendGoal", "GetResult")
-"""The endings of the names of an action's parts: its sections, the message of its topic, and its services."""
+"""The endings of the names of an action's parts: its sections, the message of its topic, and its
+services.
+"""
 
 
 def action_parts(name: str, sections: "list[Section]", resolve: "Resolve") -> list[Interface]:
@@ -159,7 +211,8 @@ def action_parts(name: str, sections: "list[Section]", resolve: "Resolve") -> li
     Source: ROS 2's design, "Actions", and rosidl, which adds the goal's id to what is sent.
     """
     goal, result, feedback = (
-        Interface(f"{name}_{part}", "msg", *section) for part, section in zip(ACTION_PARTS, sections, strict=False)
+        Interface(f"{name}_{part}", "msg", *section)
+        for part, section in zip(ACTION_PARTS, sections, strict=False)
     )
     uuid = resolve("unique_identifier_msgs/UUID")
 
@@ -169,18 +222,23 @@ def action_parts(name: str, sections: "list[Section]", resolve: "Resolve") -> li
     def service(part: str, request: list[Field], response: list[Field]) -> Interface:
         halves = zip(("Request", "Response"), (request, response), strict=True)
         return Interface(
-            f"{name}_{part}", "srv",
-            parts=tuple(Interface(f"{name}_{part}_{half}", "msg", tuple(fields)) for half, fields in halves),
-        )  # fmt: skip
+            f"{name}_{part}",
+            "srv",
+            parts=tuple(
+                Interface(f"{name}_{part}_{half}", "msg", tuple(fields)) for half, fields in halves
+            ),
+        )
 
     identified = nested("goal_id", uuid)
     accepted = [Field("accepted", "bool"), nested("stamp", resolve("builtin_interfaces/Time"))]
     return [
-        goal, result, feedback,
+        goal,
+        result,
+        feedback,
         Interface(f"{name}_FeedbackMessage", "msg", (identified, nested("feedback", feedback))),
         service("SendGoal", [identified, nested("goal", goal)], accepted),
         service("GetResult", [identified], [Field("status", "int8"), nested("result", result)]),
-    ]  # fmt: skip
+    ]
 
 
 class Section(NamedTuple):
@@ -193,11 +251,14 @@ class Section(NamedTuple):
 Resolve = Callable[[str], Interface]
 
 
-def parse(text: str, where: str, resolve: Resolve, first: int = 1, strict: bool = False) -> list[Section]:
-    """The sections of a file, separated by `---`. `resolve` returns the message for a name such as `Pose`.
+def parse(
+    text: str, where: str, resolve: Resolve, first: int = 1, strict: bool = False
+) -> list[Section]:
+    """The sections of a file, separated by `---`. `resolve` returns the message for a name such as
+    `Pose`.
 
-    Raises InterfaceError with `where` and the line, counted from `first`; if `strict`, also for the names of fields
-    and constants that ROS 2 refuses, and ROS 1 does not.
+    Raises InterfaceError with `where` and the line, counted from `first`; if `strict`, also for the
+    names of fields and constants that ROS 2 refuses, and ROS 1 does not.
     """
     if len(text) > LARGEST_FILE:
         raise InterfaceError(f"{where}: {len(text)} characters; at most {LARGEST_FILE} are read")
@@ -225,7 +286,9 @@ def parse(text: str, where: str, resolve: Resolve, first: int = 1, strict: bool 
 
 
 def _bare(line: str) -> str:
-    """The line without its comment. A `#` in quotes does not start one, unless the quotes are unbalanced."""
+    """The line without its comment. A `#` in quotes does not start one, unless the quotes are
+    unbalanced.
+    """
     quote = ""
     for at, letter in enumerate(line):
         if quote:
@@ -242,11 +305,15 @@ def _member(line: str, resolve: Resolve, before: list[Field | Constant]) -> Fiel
     if not found:
         if not line.strip("-"):
             raise InterfaceError(f"{line[:80]!r} is not a field; the line between two parts is ---")
-        forms = "TYPE NAME, TYPE NAME DEFAULT, TYPE NAME=VALUE, or # COMMENT; an array is TYPE[] NAME"
+        forms = (
+            "TYPE NAME, TYPE NAME DEFAULT, TYPE NAME=VALUE, or # COMMENT; an array is TYPE[] NAME"
+        )
         raise InterfaceError(f"{line[:80]!r} is not a field; write {forms}")
     name = found["name"]
     if name in PRIMITIVES and found["type"] not in PRIMITIVES:
-        raise InterfaceError(f"{line[:80]!r} is not a field; the type comes first: {name} {found['type']}")
+        raise InterfaceError(
+            f"{line[:80]!r} is not a field; the type comes first: {name} {found['type']}"
+        )
     if any(member.name == name for member in before):
         raise InterfaceError(f"{name!r} is defined twice")
     field = _field(found, resolve)
@@ -266,7 +333,9 @@ def _check_name(member: Field | Constant) -> None:
         raise InterfaceError(f"{member.name!r} is not a valid name of a field; {rule}: {right}")
     if isinstance(member, Constant) and not _CONSTANT_NAME.fullmatch(member.name):
         default = f", or for a field with a default {member.type} {member.name} {member.value}"
-        raise InterfaceError(f"{member.name!r} is not a valid name of a constant; write {right.upper()}{default}")
+        raise InterfaceError(
+            f"{member.name!r} is not a valid name of a constant; write {right.upper()}{default}"
+        )
 
 
 def _field(found: re.Match[str], resolve: Resolve) -> Field:
@@ -275,10 +344,16 @@ def _field(found: re.Match[str], resolve: Resolve) -> Field:
         nested = resolve(OLD.get(kind, kind))
         kind = nested.name
     if found["longest"] and (kind not in TEXTS or not longest):
-        raise InterfaceError(f"{found['type']}<={found['longest']}: only a string has a bound, from 1 up")
+        raise InterfaceError(
+            f"{found['type']}<={found['longest']}: only a string has a bound, from 1 up"
+        )
     array, bound = _array(found["array"])
     field = Field(found["name"], kind, array, bound, None, longest, nested)
-    return field if found["default"] is None else field._replace(default=_parsed_default(field, found["default"]))
+    return (
+        field
+        if found["default"] is None
+        else field._replace(default=_parsed_default(field, found["default"]))
+    )
 
 
 def _array(text: str | None) -> tuple[str, int]:
@@ -305,7 +380,11 @@ def _parsed_default(field: Field, text: str) -> Any:
 
 def fits_length(field: Field, length: int) -> bool:
     """Whether an array field may have `length` elements."""
-    return length == field.bound if field.array == "fixed" else not field.bound or length <= field.bound
+    return (
+        length == field.bound
+        if field.array == "fixed"
+        else not field.bound or length <= field.bound
+    )
 
 
 def _items(field: Field, text: str) -> list[str]:
@@ -346,21 +425,27 @@ def _text(field: Field, text: str) -> str:
 
 
 def prototype(interface: Interface) -> dict[str, Any]:
-    """A message with each field at its default: the one in the definition, else zero, empty or false."""
+    """A message with each field at its default: the one in the definition, else zero, empty or
+    false.
+    """
     return {field.name: _default(field) for field in interface.fields}
 
 
-def completed(interface: Interface, value: Any, path: str = "", tolerant: bool = False) -> dict[str, Any]:
+def completed(
+    interface: Interface, value: Any, path: str = "", tolerant: bool = False
+) -> dict[str, Any]:
     """`value` with missing fields at their defaults.
 
-    Raises InterfaceError with the path of the first field that does not exist (and the most similar one that does) or
-    whose value has the wrong type, range or length. If `tolerant`, fields that do not exist are left out. NaN and
-    infinities are numbers. A mapping stands for a list of pairs.
+    Raises InterfaceError with the path of the first field that does not exist (and the most similar
+    one that does) or whose value has the wrong type, range or length. If `tolerant`, fields that do
+    not exist are left out. NaN and infinities are numbers. A mapping stands for a list of pairs.
     """
     names = [field.name for field in interface.fields]
     if not isinstance(value, dict):
         fix = f"; write {{{shorten(': ..., '.join(names))}: ...}}" if names else ""
-        raise InterfaceError(f"{path or interface.name}: {shorten(repr(value))} is not a mapping of fields{fix}")
+        raise InterfaceError(
+            f"{path or interface.name}: {shorten(repr(value))} is not a mapping of fields{fix}"
+        )
     for name in value:
         if name not in names and not tolerant:
             where = f"{path}.{name}" if path else f"{name}"
@@ -375,24 +460,30 @@ def completed(interface: Interface, value: Any, path: str = "", tolerant: bool =
 
 
 MAPPED = "holozen/msg/RefusalCount"
-"""A sequence of these pairs is an object in JSON and msgpack."""
+"""A sequence of these pairs is an object in JSON."""
 
 
 def with_mappings(interface: Interface, value: dict[str, Any]) -> dict[str, Any]:
-    """A message with all its fields as JSON and msgpack have it, see MAPPED."""
+    """A message with all its fields as JSON has it, see MAPPED."""
     mapped = [field for field in interface.fields if field.nested and field.nested.name == MAPPED]
-    return value | {field.name: dict(pair.values() for pair in value[field.name]) for field in mapped}
+    return value | {
+        field.name: dict(pair.values() for pair in value[field.name]) for field in mapped
+    }
 
 
 def _slip(name: object, value: object) -> str:
-    """The end of an error line about a name that only YAML's rules made of what was written; else empty."""
+    """The end of an error line about a name that only YAML's rules made of what was written; else
+    empty.
+    """
     if ":" in str(name):
         return "; write a space after ':'"
     return "; write a decimal point, not a comma" if value is None and str(name).isdecimal() else ""
 
 
 def field_hint(name: str, names: Sequence[str]) -> str:
-    """The end of an error line about a field that a message does not have: the most similar one, or all."""
+    """The end of an error line about a field that a message does not have: the most similar one, or
+    all.
+    """
     return suggest(name, names) or f"; it has {', '.join(names) or 'none'}"
 
 
@@ -422,7 +513,9 @@ def _checked(field: Field, value: Any, path: str, tolerant: bool) -> Any:
         raise InterfaceError(f"{path}: {shorten(repr(value))} is not a list")
     if not fits_length(field, len(value)):
         raise InterfaceError(f"{path}: {len(value)} values for {field.spelled()}")
-    return [_element(field, inner, f"{path}[{index}]", tolerant) for index, inner in enumerate(value)]
+    return [
+        _element(field, inner, f"{path}[{index}]", tolerant) for index, inner in enumerate(value)
+    ]
 
 
 def _pair(field: Field) -> list[str]:
@@ -435,14 +528,20 @@ def _element(field: Field, value: Any, path: str, tolerant: bool) -> Any:
         return completed(field.nested, value, path, tolerant)
     if _fits(field, value):
         return float(value) if field.type in FLOATS else value
-    raise InterfaceError(f"{path}: {shorten(repr(value))} is not a valid {field._replace(array='').spelled()}")
+    raise InterfaceError(
+        f"{path}: {shorten(repr(value))} is not a valid {field._replace(array='').spelled()}"
+    )
 
 
 def _fits(field: Field, value: Any) -> bool:
     if field.type == "bool" or isinstance(value, bool):
         return field.type == "bool" and isinstance(value, bool)
     if field.type in TEXTS:
-        return isinstance(value, str) and _is_unicode(value) and not 0 < field.longest < len(value.encode())
+        return (
+            isinstance(value, str)
+            and _is_unicode(value)
+            and not 0 < field.longest < len(value.encode())
+        )
     if field.type in FLOATS:
         return isinstance(value, float | int) and _is_number(field.type, value)
     low, high = INTEGERS[field.type]
@@ -468,20 +567,29 @@ def whole_text(interface: Interface) -> str:
     """The definitions of a message and of those nested in it, as ROS 2 joins them in bags."""
     parts: dict[str, Interface] = {}
     _collect(interface, parts)
-    others = [f"{SEPARATOR}\nMSG: {one.name.replace('/msg/', '/')}\n{_definition(one)}" for one in parts.values()]
+    others = [
+        f"{SEPARATOR}\nMSG: {one.name.replace('/msg/', '/')}\n{_definition(one)}"
+        for one in parts.values()
+    ]
     return "\n".join([_definition(interface), *others])
 
 
 def split_text(name: str, text: str) -> dict[str, str]:
-    """The definition of each message in the `whole_text` of `name`, by full names. Raises InterfaceError."""
+    """The definition of each message in the `whole_text` of `name`, by full names. Raises
+    InterfaceError.
+    """
     if len(text) > LARGEST_FILE:
-        raise InterfaceError(f"{name}: a definition of {len(text)} characters; at most {LARGEST_FILE} are read")
+        raise InterfaceError(
+            f"{name}: a definition of {len(text)} characters; at most {LARGEST_FILE} are read"
+        )
     first, *others = text.split(f"{SEPARATOR}\nMSG: ")
     found = {name: first}
     for other in others:
         package, _, rest = other.partition("/")
         last, _, lines = rest.partition("\n")
-        found[f"{package}/{last}" if "/" in last else f"{package}/msg/{last}"] = lines  # that of an action has its kind
+        found[f"{package}/{last}" if "/" in last else f"{package}/msg/{last}"] = (
+            lines  # that of an action has its kind
+        )
     return found
 
 
@@ -493,4 +601,6 @@ def _collect(interface: Interface, found: dict[str, Interface]) -> None:
 
 
 def _definition(interface: Interface) -> str:
-    return "\n".join([*(one.line() for one in interface.constants), *(one.line() for one in interface.fields)])
+    return "\n".join(
+        [*(one.line() for one in interface.constants), *(one.line() for one in interface.fields)]
+    )

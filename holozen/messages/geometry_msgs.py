@@ -49,7 +49,9 @@ class Twist(Message):
         return cls(Vector3(x, y, 0.0), Vector3(0.0, 0.0, turn))
 
     def is_slow(self, limit: float = 0.0) -> bool:
-        """Whether no component exceeds `limit` in m/s or rad/s; by default, whether this is a stop. A NaN is not."""
+        """Whether no component exceeds `limit` in m/s or rad/s; by default, whether this is a stop.
+        A NaN is not.
+        """
         sizes = (abs(size) for v in (self.linear, self.angular) for size in (v.x, v.y, v.z))
         return all(size <= limit for size in sizes)
 
@@ -81,8 +83,12 @@ class Pose(Message):
     orientation: Quaternion = field(default_factory=Quaternion)
 
     @classmethod
-    def of(cls, position: tuple[float, float, float], orientation: tuple[float, float, float, float]) -> "Pose":
-        """x, y, z in m, and a quaternion x, y, z, w. The way back is `holozen.rotation.Transform.of`."""
+    def of(
+        cls, position: tuple[float, float, float], orientation: tuple[float, float, float, float]
+    ) -> "Pose":
+        """x, y, z in m, and a quaternion x, y, z, w. The way back is
+        `holozen.rotation.Transform.of`.
+        """
         return cls(Point(*position), Quaternion(*orientation))
 
     def planar(self) -> tuple[float, float, float]:

@@ -13,7 +13,8 @@ from holozen.messages.std_msgs import Header
 class CommandSource(Message):
     """A source of commands: its Zenoh priority, its rate in Hz, and whether it is obeyed or held.
 
-    `delay` is the greatest possible age of its last command when it was read, in seconds; 0 if unknown.
+    `delay` is the greatest possible age of its last command when it was read, in seconds; 0 if
+    unknown.
     """
 
     source: str = ""
@@ -34,12 +35,15 @@ class RefusalCount(Message):
 class CommandStatus(Message):
     """Which source drives a robot, and how many commands were accepted and refused.
 
-    `obeyed` is the driving source (empty: none), `priority` its Zenoh priority. `held` is true after a source of higher
-    priority took over: lower ones wait for a call of `resume`. `resumed` counts these calls; `accepted` and `refused`
-    (by reason; pairs in ROS) count commands since the start of the sim. `stopped` names the node that set the software
-    stop (empty: none); `sources` are those with recent commands. `name` is the robot's in the sim. Commands beyond
-    `max_linear` (m/s) and `max_angular` (rad/s) are clamped (0: not known); `strafes` is whether its drive can move it
-    sideways. `commanded` is the velocity that it obeys, clamped; zero if none drives it.
+    `obeyed` is the driving source (empty: none), `priority` its Zenoh priority. `held` is true
+    after a source of higher priority took over: lower ones wait for a call of `resume`. `resumed`
+    counts these calls; `accepted` and `refused` (by reason; pairs in ROS) count commands since the
+    start of the sim. `stopped` names the node that set the software stop (empty: none); `sources`
+    are those with recent commands. `name` is the robot's in the sim. Commands beyond `max_linear`
+    (m/s) and `max_angular` (rad/s) are clamped (0: not known); `strafes` is whether its drive can
+    move it sideways. `commanded` is the velocity that it obeys, clamped so and before the limits of
+    its file; zero if none drives it. `time_before_collision` (s) is that of its collision monitor,
+    0 while that is off; `limited` is how it limits `commanded` now, and why (empty: it does not).
     """
 
     obeyed: str = ""
@@ -47,7 +51,9 @@ class CommandStatus(Message):
     held: bool = False
     resumed: UInt64 = 0
     accepted: UInt64 = 0
-    refused: Annotated[dict[str, UInt64], Meta(extra={"ros": "RefusalCount[]"})] = field(default_factory=dict)
+    refused: Annotated[dict[str, UInt64], Meta(extra={"ros": "RefusalCount[]"})] = field(
+        default_factory=dict
+    )
     last_refusal: str = ""
     stopped: str = ""
     sources: list[CommandSource] = field(default_factory=list)
@@ -56,15 +62,19 @@ class CommandStatus(Message):
     max_angular: float = 0.0
     strafes: bool = True
     commanded: Twist = field(default_factory=Twist)
+    time_before_collision: float = 0.0
+    limited: str = ""
 
 
 class SimulationStatus(Message):
-    """How the sim's time passes. `state` is one of simulation_interfaces/msg/SimulationState; `time` is that of `clock`
-    in s, after `steps` steps of `step` seconds. Each reset begins a new `epoch`, in which the time may start again.
+    """How the sim's time passes. `state` is one of simulation_interfaces/msg/SimulationState;
+    `time` is that of `clock` in s, after `steps` steps of `step` seconds. Each reset begins a new
+    `epoch`, in which the time may start again.
 
-    `real_time_factor` is measured over the last second; `target` is the one to keep (0: as fast as possible). A sim
-    that falls behind by more than 0.1 s does not catch up: this counts as one of `overruns`, and adds to `lost`, the
-    seconds of real time lost since the start.
+    `real_time_factor` is measured over the last second; `target` is the one to keep (0: as fast as
+    possible). A sim that falls behind by more than 0.1 s does not catch up: this counts as one of
+    `overruns`, and adds to `lost`, the seconds of real time lost since the start. `engine` is the
+    physics engine, and why it was chosen.
     """
 
     state: UInt8 = 0
@@ -76,6 +86,7 @@ class SimulationStatus(Message):
     target: float = 0.0
     overruns: UInt64 = 0
     lost: float = 0.0
+    engine: str = ""
 
 
 class NextGoalRequest(Message):
@@ -105,10 +116,11 @@ class GetPoseReply(Message):
 
 
 class SceneEntity(Message):
-    """An entity of the sim and its pose in the world. `number` is different after every spawn, in any sim.
+    """An entity of the sim and its pose in the world. `number` is different after every spawn, in
+    any sim.
 
-    `command` and `odometry` are the keys of its commands and its odometry; empty if it has none. `joints` are the
-    positions of its joints, in rad or m, in the order of RobotDescriptionReply.
+    `command` and `odometry` are the keys of its commands and its odometry; empty if it has none.
+    `joints` are the positions of its joints, in rad or m, in the order of RobotDescriptionReply.
     """
 
     name: str = ""
@@ -120,7 +132,9 @@ class SceneEntity(Message):
 
 
 class GetSceneRequest(Message):
-    """Asks for all entities. With `without_joints` their `joints` are empty, which takes a sim half the time."""
+    """Asks for all entities. With `without_joints` their `joints` are empty, which takes a sim half
+    the time.
+    """
 
     without_joints: bool = False
 
@@ -138,7 +152,9 @@ class RobotDescriptionRequest(Message):
 
 
 class RobotDescriptionReply(Message):
-    """Its URDF, with the visual meshes in it, and the `number` and the names of the `joints` of its SceneEntity."""
+    """Its URDF, with the visual meshes in it, and the `number` and the names of the `joints` of its
+    SceneEntity.
+    """
 
     description: str = ""
     number: UInt64 = 0
@@ -155,12 +171,14 @@ class SeenEntity(Message):
 
 
 class Exposure(Message):
-    """An image to render: the scene at the time of `header`, and the camera, which is at `pose` in the world and looks
-    along its x axis. A `width` of 0 is the end of the camera that has these keys.
+    """An image to render: the scene at the time of `header`, and the camera, which is at `pose` in
+    the world and looks along its x axis. A `width` of 0 is the end of the camera that has these
+    keys.
 
-    `image`, `info` and `depth` are the keys to publish on (empty: none), with the stamp and frame of `header`. `width`
-    and `height` in pixels; `field_of_view` across the width in rad; `near` and `far` in m; `encoding` is "rgb8" or
-    "mono8"; the noise is added to pixel values from 0 to 1. `ground`: whether there is a level plane at z = 0.
+    `image`, `info` and `depth` are the keys to publish on (empty: none), with the stamp and frame
+    of `header`. `width` and `height` in pixels; `field_of_view` across the width in rad; `near` and
+    `far` in m; `encoding` is "rgb8" or "mono8"; the noise is added to pixel values from 0 to 1.
+    `ground`: whether there is a level plane at z = 0.
     """
 
     header: Header = field(default_factory=Header)

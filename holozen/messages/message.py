@@ -1,4 +1,6 @@
-"""The base of all messages, the integer types of ROS, and the numbers and arrays within a message."""
+"""The base of all messages, the integer types of ROS, and the numbers and arrays within a
+message.
+"""
 
 import math
 import struct
@@ -23,16 +25,19 @@ Int32 = Annotated[int, Meta(ge=-(2**31), lt=2**31, extra={"ros": "int32"})]
 UInt64 = Annotated[int, Meta(ge=0, extra={"ros": "uint64"})]
 
 
-class Message(Struct, forbid_unknown_fields=True, gc=False):  # they make no cycles for the collector to look for
+# they make no cycles for the collector to look for
+class Message(Struct, forbid_unknown_fields=True, gc=False):
     """A message of ROS, field for field. A field left out is zero.
 
-    The name in ROS follows from the module and the class, with the ending Request or Reply for the two halves of a
-    service.
+    The name in ROS follows from the module and the class, with the ending Request or Reply for the
+    two halves of a service.
     """
 
     ROS: ClassVar[str] = ""
-    SETTLE: ClassVar[Callable[[Any], None] | None] = None  # checks the fields before the message is written
-    ANY_NUMBER: ClassVar[bool] = False  # whether a NaN or an infinity is sent (as CDR) instead of refused
+    # checks the fields before the message is written
+    SETTLE: ClassVar[Callable[[Any], None] | None] = None
+    # whether a NaN or an infinity is sent (as CDR) instead of refused
+    ANY_NUMBER: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         package, name = cls.__module__.rpartition(".")[2], cls.__name__
@@ -41,7 +46,9 @@ class Message(Struct, forbid_unknown_fields=True, gc=False):  # they make no cyc
 
 
 def packed(code: str, values: Sequence[Any]) -> "array[Any]":
-    """A list of numbers as an array. Raises OverflowError for one beyond a float32, struct.error for an integer."""
+    """A list of numbers as an array. Raises OverflowError for one beyond a float32, struct.error
+    for an integer.
+    """
     if code == "B":
         return array(code, bytes(values))
     made: array[Any] = array(code)
@@ -50,8 +57,8 @@ def packed(code: str, values: Sequence[Any]) -> "array[Any]":
 
 
 def listed(value: Any) -> Any:
-    """An array as a list, and a number of numpy as one of Python, which the wire carries instead. Raises TypeError for
-    anything else.
+    """An array as a list, and a number of numpy as one of Python, which the wire carries instead.
+    Raises TypeError for anything else.
     """
     if hasattr(value, "tolist"):
         return value.tolist()
@@ -59,12 +66,16 @@ def listed(value: Any) -> Any:
 
 
 def not_finite(message: Message) -> str:
-    """The path of the first number in `message` that is NaN or infinite, such as `linear.x`; else empty."""
+    """The path of the first number in `message` that is NaN or infinite, such as `linear.x`; else
+    empty.
+    """
     return limits.not_finite(msgspec.to_builtins(message, enc_hook=_suspects))
 
 
 def _suspects(value: Any) -> Any:
-    """As `listed`, but an array is an empty list unless one of its numbers may not be finite. Raises TypeError."""
+    """As `listed`, but an array is an empty list unless one of its numbers may not be finite.
+    Raises TypeError.
+    """
     if isinstance(value, array) and (value.typecode not in "fd" or math.isfinite(sum(value))):
         return []
     return listed(value)

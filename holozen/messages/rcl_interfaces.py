@@ -11,9 +11,17 @@ Value = bool | int | float | str | list[bool] | list[int] | list[float] | list[s
 
 NOT_SET, BOOL, INTEGER, DOUBLE, STRING, BYTE_ARRAY, BOOL_ARRAY = range(7)
 WORDS = (
-    "not set", "boolean", "integer", "double", "string", "byte array", "boolean array", "integer array", "double array",
+    "not set",
+    "boolean",
+    "integer",
+    "double",
+    "string",
+    "byte array",
+    "boolean array",
+    "integer array",
+    "double array",
     "string array",
-)  # fmt: skip
+)
 """Names of the types of ParameterType, in their order."""
 
 
@@ -79,7 +87,9 @@ class ParameterDescriptor(Message):
     additional_constraints: str = ""
     read_only: bool = False
     dynamic_typing: bool = False
-    floating_point_range: Annotated[list[FloatingPointRange], Meta(max_length=1)] = field(default_factory=list)
+    floating_point_range: Annotated[list[FloatingPointRange], Meta(max_length=1)] = field(
+        default_factory=list
+    )
     integer_range: Annotated[list[IntegerRange], Meta(max_length=1)] = field(default_factory=list)
 
 
@@ -94,7 +104,9 @@ class SetParametersResult(Message):
 
 
 class ListParametersRequest(Message):
-    """Asks for the names below `prefixes` (empty: all), with at most `depth` parts after the prefix (0: any)."""
+    """Asks for the names below `prefixes` (empty: all), with at most `depth` parts after the prefix
+    (0: any).
+    """
 
     DEPTH_RECURSIVE: ClassVar[UInt64] = 0
 

@@ -1,11 +1,14 @@
-"""Looks up types by name, in the tables of interfaces/ and in the msg, srv and action folders of packages."""
+"""Looks up types by name, in the tables of interfaces/ and in the msg, srv and action folders of
+packages.
+"""
 
+import contextlib
 import functools
 import os
 import re
 import stat
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from holozen.messages.definitions import (
     ACTION_PARTS,
@@ -19,6 +22,9 @@ from holozen.messages.definitions import (
 )
 from holozen.suggest import last_part, listed, suggest
 
+if TYPE_CHECKING:
+    from pathlib import Path
+
 TABLES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "interfaces")
 KINDS = ("msg", "srv", "action")
 _SECTIONS = {"msg": 1, "srv": 2, "action": 3}  # of a file
@@ -26,17 +32,25 @@ _NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/(?:(msg|srv|action)/)?([A-Za-z][A-Z
 DEEPEST = 50  # levels of nesting
 MAX_LOST = 100  # unknown names that are remembered, so that they are not looked up again
 MAX_SHOWN = 20  # names in an error
-OTHER_WORDS = {"float": "float32 or float64", "double": "float64", "int": "int32 or int64", "boolean": "bool"}
+OTHER_WORDS = {
+    "float": "float32 or float64",
+    "double": "float64",
+    "int": "int32 or int64",
+    "boolean": "bool",
+}
 """Types of other languages -> the ones to write."""
 _HALVES = ("_Request", "_Response")
-_PARTS = tuple(f"_{part}{half}" for part in ACTION_PARTS for half in ("", *_HALVES))  # ends of names within an action
+# ends of names within an action
+_PARTS = tuple(f"_{part}{half}" for part in ACTION_PARTS for half in ("", *_HALVES))
 
 Folders = Mapping[str, "str | os.PathLike[str]"]
 Paths = Sequence["str | os.PathLike[str]"]
 
 
 class Source(NamedTuple):
-    """The text of a definition, its file, and its first line; `strict` if its names have to be those of ROS 2."""
+    """The text of a definition, its file, and its first line; `strict` if its names have to be
+    those of ROS 2.
+    """
 
     text: str
     where: str
@@ -46,7 +60,11 @@ class Source(NamedTuple):
 
 def table(package: str) -> dict[str, Source]:
     """The definitions of a package that comes with holozen, by `msg/Name`; empty for any other."""
-    structs = {name: source for name, source in _sections("structs").items() if name.startswith(f"{package}/")}
+    structs = {
+        name: source
+        for name, source in _sections("structs").items()
+        if name.startswith(f"{package}/")
+    }
     return {name.partition("/")[2]: source for name, source in structs.items()} | _sections(package)
 
 
@@ -58,7 +76,9 @@ def tables() -> list[str]:
 
 @functools.cache
 def _sections(name: str) -> dict[str, Source]:
-    """The definitions in a file of interfaces/, by their headings; empty if there is no such file."""
+    """The definitions in a file of interfaces/, by their headings; empty if there is no such
+    file.
+    """
     path = os.path.join(TABLES, f"{name}.txt")
     if not os.path.isfile(path):
         return {}
@@ -75,8 +95,8 @@ def _sections(name: str) -> dict[str, Source]:
 class Places:
     """Finds the definitions of packages.
 
-    `given` are the folders of some of them. The others are looked up once, around the files or folders `near` and
-    around the working folder.
+    `given` are the folders of some of them. The others are looked up once, around the files or
+    folders `near` and around the working folder.
     """
 
     def __init__(self, given: Folders, near: Paths = ()) -> None:
@@ -86,7 +106,9 @@ class Places:
         self.learned: dict[str, Source] = {}  # by full names; what is here comes first
 
     def source(self, package: str, name: str) -> Source | None:
-        """The definition of `name` (such as `msg/Twist`) in a package; None if there is none. Raises InterfaceError."""
+        """The definition of `name` (such as `msg/Twist`) in a package; None if there is none.
+        Raises InterfaceError.
+        """
         if package not in self._given and (ours := table(package)):
             return ours.get(name)
         path = self.folder(package)
@@ -102,61 +124,67 @@ class Places:
         found = sorted(_names_in(path)) if path else []
         if package in self._given and not found:
             raise InterfaceError(
-                f"--package {package}={path}: no .msg, .srv or .action files in its folders msg, srv and action"
+                f"--package {package}={path}: no .msg, .srv or .action files in its folders msg, "
+                "srv and action"
             )
         return found
 
     def packages(self) -> list[str]:
-        """Our own, the given ones, and those of the environment's folders and around that hold definitions."""
+        """Our own, the given ones, and those of the environment's folders and around that hold
+        definitions.
+        """
         shared = [os.path.join(prefix, "share") for prefix in _environment("AMENT_PREFIX_PATH")]
         for place in (*shared, *_environment("ROS_PACKAGE_PATH")):
             for name in _listing(place):
                 path = os.path.join(place, name)
                 if re.fullmatch(r"\w+", name) and any(_names_in(path)):
                     self._found.setdefault(name, path)
-        for name, path in _around(self._near).items():
-            if any(_names_in(path)):
+        for name, folders in (item for ring in self._rings for item in ring.items()):
+            if any(_names_in(path := str(folders[0]))):
                 self._found.setdefault(name, path)
-        return sorted({*tables(), *self._given, *(name for name, path in self._found.items() if path)})
+        return sorted(
+            {*tables(), *self._given, *(name for name, path in self._found.items() if path)}
+        )
 
     def folder(self, package: str) -> str | None:
-        """The folder of a package that is not ours; None if it is not found. Raises InterfaceError."""
+        """The folder of a package that is not ours; None if it is not found. Raises
+        InterfaceError.
+        """
         if package not in self._given:
             if package not in self._found:
-                self._found[package] = _look_up(package, self._near)
+                self._found[package] = self._look_up(package)
             return self._found[package]
         path = self._given[package]
         if not os.path.isdir(path):
             raise InterfaceError(f"--package {package}={path}: there is no such folder")
         return path
 
+    def _look_up(self, package: str) -> str | None:
+        """The folder of a package that is not ours, found as those of scripts are. Raises
+        InterfaceError.
+        """
+        from pathlib import Path
 
-def _look_up(package: str, near: Paths) -> str | None:
-    """The folder of a package that is not ours, found as those of robot files are. Raises InterfaceError."""
-    from pathlib import Path
+        from holozen.packages import find_declared, nearest
+        from holozen.robot.errors import RobotError
 
-    from holozen.robot.packages import find_named
+        try:
+            found = find_declared(package, Path()) or nearest(package, self._rings)
+        except RobotError as error:
+            raise InterfaceError(str(error)) from None
+        return str(found) if found else None
 
-    try:
-        found = next(filter(None, (find_named(package, start) for start in [*map(Path, near), Path.cwd()])), None)
-    except OSError as error:  # the working folder is gone
-        raise InterfaceError(f"package {package}: {error.strerror}") from None
-    return str(found) if found else _around(near).get(package)
+    @functools.cached_property
+    def _rings(self) -> "list[dict[str, list[Path]]]":
+        """The packages around the files or folders `near` and the working folder."""
+        from pathlib import Path
 
+        from holozen.packages import rings
 
-def _around(near: Paths) -> dict[str, str]:
-    """Name -> folder of the packages above and below the files or folders `near`, and the working folder."""
-    from pathlib import Path
-
-    from holozen.robot.packages import folders_above, folders_below, packages_in
-
-    try:
-        starts = [*map(Path, near), Path.cwd()]
-    except OSError:  # the working folder is gone
-        return {}
-    ways = [(above, folders_below(start)) for start in starts if (above := folders_above(start))]
-    found = packages_in([folder for way in zip(*ways, strict=True) for folders in way for folder in folders])
-    return {name: str(folder) for name, folder in found.items()}
+        starts = [*map(Path, self._near)]
+        with contextlib.suppress(OSError):  # the working folder is gone
+            starts.append(Path.cwd())
+        return list(rings(starts))
 
 
 def _environment(variable: str) -> list[str]:
@@ -195,8 +223,9 @@ def _read(path: str) -> Source | None:
 class Registry:
     """Finds types, each parsed once.
 
-    A package is looked up among `packages` (name -> folder, as `--package NAME=DIR` gives), in our own tables, then in
-    AMENT_PREFIX_PATH, ROS_PACKAGE_PATH, around the files or folders `near` and around the working folder.
+    A package is looked up among `packages` (name -> folder, as `--package NAME=DIR` gives), in our
+    own tables, then in AMENT_PREFIX_PATH, ROS_PACKAGE_PATH, around the files or folders `near` and
+    around the working folder.
     """
 
     def __init__(self, packages: Folders = {}, near: Paths = ()) -> None:
@@ -207,8 +236,8 @@ class Registry:
         self._open: list[str] = []  # types being parsed, to detect one that contains itself
 
     def find(self, name: str) -> Interface:
-        """The type called `name`: `geometry_msgs/msg/Twist`, `std_srvs/srv/Trigger`, or a service's half
-        `std_srvs/srv/Trigger_Request`. Raises InterfaceError, with the closest name there is.
+        """The type called `name`: `geometry_msgs/msg/Twist`, `std_srvs/srv/Trigger`, or a service's
+        half `std_srvs/srv/Trigger_Request`. Raises InterfaceError, with the closest name there is.
         """
         if name in self._found:
             return self._found[name]
@@ -223,8 +252,8 @@ class Registry:
         return found
 
     def learn(self, name: str, define: Callable[[str], str]) -> Interface:
-        """As `find`; for a type that is not known, `define` is called once, which returns its `whole_text` or an empty
-        text. Raises InterfaceError.
+        """As `find`; for a type that is not known, `define` is called once, which returns its
+        `whole_text` or an empty text. Raises InterfaceError.
         """
         try:
             return self.find(name)
@@ -233,7 +262,9 @@ class Registry:
                 raise
         self._asked.add(name)
         learned = split_text(name, text)
-        self.places.learned |= {full: Source(part, f"the definition of {full}") for full, part in learned.items()}
+        self.places.learned |= {
+            full: Source(part, f"the definition of {full}") for full, part in learned.items()
+        }
         for full in learned:
             self._lost.pop(full, None)
         return self.find(name)
@@ -286,12 +317,20 @@ class Registry:
                 made = action_parts(full, sections, self.find)
             else:
                 ends = _HALVES if kind == "srv" else ("",)
-                made = [Interface(full + end, "msg", *section) for end, section in zip(ends, sections, strict=True)]
+                made = [
+                    Interface(full + end, "msg", *section)
+                    for end, section in zip(ends, sections, strict=True)
+                ]
         finally:
             self._open.pop()
         if kind != "msg":
             made.append(Interface(full, kind, parts=tuple(made)))
-        made += [half for service in made if kind == "action" and service.kind == "srv" for half in service.parts]
+        made += [
+            half
+            for service in made
+            if kind == "action" and service.kind == "srv"
+            for half in service.parts
+        ]
         self._found.update({interface.name: interface for interface in made})
 
     def _nested(self, package: str, strict: bool, name: str) -> Interface:
@@ -299,7 +338,9 @@ class Registry:
         if "/" in name:
             home, kind, last = _parts(name)
             if strict and kind == "msg":
-                raise InterfaceError(f"{name!r} has a 'msg' that ROS 2 refuses in a file; write {home}/{last}")
+                raise InterfaceError(
+                    f"{name!r} has a 'msg' that ROS 2 refuses in a file; write {home}/{last}"
+                )
             if kind == "srv" or (kind == "action" and _file(f"action/{last}") == f"action/{last}"):
                 what = "a service" if kind == "srv" else "an action"
                 raise InterfaceError(f"{name}: a field is a message, not {what}")
@@ -319,16 +360,30 @@ class Registry:
         if not known:
             there = self.places.packages()
             hint = suggest(package, there) or f"; known: {listed(there, MAX_SHOWN)}"
-            return f"no package {package!r} with interfaces{hint}; give its folder: --package {package}=DIR"
+            return (
+                f"no package {package!r} with interfaces{hint}; give its folder: --package "
+                f"{package}=DIR"
+            )
         last = last_part(name)
-        elsewhere = [full for full in self.names() if full.endswith(f"/msg/{last}" if self._open else f"/{last}")]
+        elsewhere = [
+            full
+            for full in self.names()
+            if full.endswith(f"/msg/{last}" if self._open else f"/{last}")
+        ]
         if self._open:  # a file names messages only, without their kind
             if near := OTHER_WORDS.get(last, last.lower() if last.lower() in PRIMITIVES else ""):
                 return f"no type {name!r}; write {near}"
-            name, known, elsewhere = _short(name), [*map(_short, known), *PRIMITIVES], [*map(_short, elsewhere)]
+            name, known, elsewhere = (
+                _short(name),
+                [*map(_short, known), *PRIMITIVES],
+                [*map(_short, elsewhere)],
+            )
         if elsewhere:
             return f"no type {name!r}; write {' or '.join(elsewhere)}"
-        return f"no type {name!r}{suggest(name, known, last_part) or '; known: ' + listed(known, MAX_SHOWN)}"
+        return (
+            "no type "
+            f"{name!r}{suggest(name, known, last_part) or '; known: ' + listed(known, MAX_SHOWN)}"
+        )
 
 
 def _check_file(where: str, name: str) -> None:
@@ -344,15 +399,17 @@ def _short(name: str) -> str:
 
 
 def _file(name: str) -> str:
-    """The name of the file that defines `srv/Trigger_Request` or `action/Fibonacci_SendGoal_Request`, such as
-    `srv/Trigger`.
+    """The name of the file that defines `srv/Trigger_Request` or
+    `action/Fibonacci_SendGoal_Request`, such as `srv/Trigger`.
     """
     ends = {"msg": (), "srv": _HALVES, "action": _PARTS}[name.partition("/")[0]]
     return next((name.removesuffix(end) for end in ends if name.endswith(end)), name)
 
 
 def full_name(name: str) -> str:
-    """A full type name as ROS 2 writes it. Raises InterfaceError if package, kind or name are missing."""
+    """A full type name as ROS 2 writes it. Raises InterfaceError if package, kind or name are
+    missing.
+    """
     package, kind, last = _parts(name)
     if not kind:
         raise InterfaceError(f"{name!r} does not specify msg, srv or action")
@@ -360,9 +417,17 @@ def full_name(name: str) -> str:
 
 
 def _parts(name: str) -> tuple[str, str, str]:
-    """Package, kind (empty if none) and name. DDS spelling is read too: geometry_msgs::msg::dds_::Twist_."""
-    plain = name.replace("::dds_::", "::").removesuffix("_").replace("::", "/") if "::" in name else name
+    """Package, kind (empty if none) and name. DDS spelling is read too:
+    geometry_msgs::msg::dds_::Twist_.
+    """
+    plain = (
+        name.replace("::dds_::", "::").removesuffix("_").replace("::", "/")
+        if "::" in name
+        else name
+    )
     found = _NAME.fullmatch(plain)
     if not found:
-        raise InterfaceError(f"{name[:80]!r} is not a type; write PACKAGE/msg/NAME, such as geometry_msgs/msg/Twist")
+        raise InterfaceError(
+            f"{name[:80]!r} is not a type; write PACKAGE/msg/NAME, such as geometry_msgs/msg/Twist"
+        )
     return found[1], found[2] or "", found[3]

@@ -27,7 +27,9 @@ class JointState(Message):
 
 
 class LaserScan(Message):
-    """Ranges in m by angle in rad about z, counter-clockwise from x. Infinite: nothing within `range_max` (REP 117)."""
+    """Ranges in m by angle in rad about z, counter-clockwise from x. Infinite: nothing within
+    `range_max` (REP 117).
+    """
 
     ANY_NUMBER: ClassVar[bool] = True
     header: Header = field(default_factory=Header)
@@ -43,7 +45,9 @@ class LaserScan(Message):
 
 
 class Range(Message):
-    """The distance in m to what is nearest in a cone about x of `field_of_view` rad. Infinite: nothing is near."""
+    """The distance in m to what is nearest in a cone about x of `field_of_view` rad. Infinite:
+    nothing is near.
+    """
 
     ANY_NUMBER: ClassVar[bool] = True
     ULTRASOUND: ClassVar[UInt8] = 0
@@ -58,8 +62,9 @@ class Range(Message):
 
 
 class Imu(Message):
-    """Orientation in the world; rotation rate in rad/s and specific force in m/s^2 in the axes of the sensor. At rest
-    the force points up, with 9.8 m/s^2. A covariance that begins with -1 marks a value that is not measured.
+    """Orientation in the world; rotation rate in rad/s and specific force in m/s^2 in the axes of
+    the sensor. At rest the force points up, with 9.8 m/s^2. A covariance that begins with -1 marks
+    a value that is not measured.
     """
 
     header: Header = field(default_factory=Header)
@@ -103,7 +108,9 @@ class PointCloud2(Message):
 
 
 class Image(Message):
-    """Pixels in rows of `step` bytes, from the top; `encoding` as in sensor_msgs/image_encodings.hpp."""
+    """Pixels in rows of `step` bytes, from the top; `encoding` as in
+    sensor_msgs/image_encodings.hpp.
+    """
 
     header: Header = field(default_factory=Header)
     height: UInt32 = 0
@@ -115,7 +122,9 @@ class Image(Message):
 
 
 class CompressedImage(Message):
-    """A picture as a file of JPEG or PNG. `format` as in ROS's image_transport: `ENCODING; jpeg compressed bgr8`."""
+    """A picture as a file of JPEG or PNG. `format` as in ROS's image_transport: `ENCODING; jpeg
+    compressed bgr8`.
+    """
 
     header: Header = field(default_factory=Header)
     format: str = ""
@@ -133,7 +142,9 @@ class RegionOfInterest(Message):
 
 
 class CameraInfo(Message):
-    """Of a pinhole camera: `k` (3 x 3) and `p` (3 x 4) by rows, in pixels; x right, y down, z forward."""
+    """Of a pinhole camera: `k` (3 x 3) and `p` (3 x 4) by rows, in pixels; x right, y down, z
+    forward.
+    """
 
     header: Header = field(default_factory=Header)
     height: UInt32 = 0

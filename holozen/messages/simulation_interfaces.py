@@ -1,7 +1,8 @@
 """The part of ROS's simulation_interfaces (1.0) that the sim serves.
 
-An entity is a robot or another object in the world. Reply codes are those of `Result`, and above 100 those of
-SpawnEntity. A request that fails is answered with an error reply, which carries the same `result`.
+An entity is a robot or another object in the world. Reply codes are those of `Result`, and above
+100 those of SpawnEntity. A request that fails is answered with an error reply, which carries the
+same `result`.
 """
 
 from typing import ClassVar
@@ -17,8 +18,8 @@ from holozen.messages.std_msgs import Header
 class Result(Message):
     """How a request ended: `OK`, or another code with a line that gives the reason.
 
-    When a robot was spawned although something in its text was replaced or left out, the result is `OK` and
-    `error_message` holds the warnings, one per line.
+    When a robot was spawned although something in its text was replaced or left out, the result is
+    `OK` and `error_message` holds the warnings, one per line.
     """
 
     FEATURE_UNSUPPORTED: ClassVar[UInt8] = 0
@@ -69,7 +70,9 @@ class EntityCategory(Message):
 
 
 class EntityFilters(Message):
-    """Selects entities. `filter` is a regular expression on their names; an empty one selects all."""
+    """Selects entities. `filter` is a regular expression on their names; an empty one selects
+    all.
+    """
 
     filter: str = ""
     categories: list[EntityCategory] = field(default_factory=list)
@@ -80,8 +83,8 @@ class EntityFilters(Message):
 class SpawnEntityRequest(Message):
     """A robot or object from `resource_string`, URDF or SDF text (clients expand xacro).
 
-    Its keys are below `entity_namespace`, by default below `name`; a slash is the root. With `allow_renaming`, or
-    without a name, an unused name is chosen.
+    Its keys are below `entity_namespace`, by default below `name`; a slash is the root. With
+    `allow_renaming`, or without a name, an unused name is chosen.
     """
 
     name: str = ""
@@ -187,9 +190,9 @@ class StepSimulationReply(Message):
 
 
 class ResetSimulationRequest(Message):
-    """`scope` is a sum: SCOPE_TIME sets the time to zero, SCOPE_STATE moves every entity to where it was added,
-    SCOPE_SPAWNED removes those that were spawned. All of them, the default, also restore entities of the start that
-    were deleted.
+    """`scope` is a sum: SCOPE_TIME sets the time to zero, SCOPE_STATE moves every entity to where
+    it was added, SCOPE_SPAWNED removes those that were spawned. All of them, the default, also
+    restore entities of the start that were deleted.
     """
 
     SCOPE_DEFAULT: ClassVar[UInt8] = 0

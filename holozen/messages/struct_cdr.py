@@ -19,7 +19,8 @@ from holozen.messages.registry import Registry
 
 _REGISTRY = Registry()
 _HALVES = {"Request": "_Request", "Reply": "_Response"}
-_WRONG = (ArithmeticError, AttributeError, TypeError, ValueError, struct.error)  # raised by wrong values
+# raised by wrong values
+_WRONG = (ArithmeticError, AttributeError, TypeError, ValueError, struct.error)
 
 
 def ros_name(kind: type[Message]) -> str:
@@ -79,7 +80,7 @@ class Structs(Shape):
         hints = typing.get_type_hints(kind, include_extras=True)
         fields = zip(interface.fields, values, strict=True)
         maker = self._makers[interface.name]
-        return f"{maker}({', '.join(self._value(hints[field.name], field, value) for field, value in fields)})"
+        return f"{maker}({', '.join(self._value(hints[field.name], field, value) for field, value in fields)})"  # noqa: E501
 
     def part(self, interface: Interface, field: Field, owner: str) -> str:
         """An attribute of a Struct, or an item of a tuple."""
@@ -87,7 +88,11 @@ class Structs(Shape):
         if kind is None:
             return f"{owner}[{interface.fields.index(field)}]"
         hint = typing.get_type_hints(kind)[field.name]
-        return f"list({owner}.{field.name}.items())" if typing.get_origin(hint) is dict else f"{owner}.{field.name}"
+        return (
+            f"list({owner}.{field.name}.items())"
+            if typing.get_origin(hint) is dict
+            else f"{owner}.{field.name}"
+        )
 
     def _add(self, kind: type[Message]) -> None:
         name, maker = ros_name(kind), f"make_{len(self._makers)}"
@@ -96,17 +101,29 @@ class Structs(Shape):
         self.names[maker] = kind if type(kind) is StructMeta else partial(StructMeta.__call__, kind)
         for hint in typing.get_type_hints(kind).values():
             for inner in (hint, *typing.get_args(hint)):
-                if isinstance(inner, type) and issubclass(inner, Message) and ros_name(inner) not in self._classes:
+                if (
+                    isinstance(inner, type)
+                    and issubclass(inner, Message)
+                    and ros_name(inner) not in self._classes
+                ):
                     self._add(inner)
 
     def _value(self, hint: Any, field: Field, value: str) -> str:
         if typing.get_origin(getattr(hint, "__origin__", hint)) is dict:
             return f"dict({value})"
-        metas = [meta for meta in getattr(hint, "__metadata__", ()) if isinstance(meta, msgspec.Meta)]
+        metas = [
+            meta for meta in getattr(hint, "__metadata__", ()) if isinstance(meta, msgspec.Meta)
+        ]
         for meta in metas if field.type in INTEGERS and not field.array else []:
             low, high = INTEGERS[field.type]
             least = low if meta.ge is None else int(meta.ge)
-            most = int(meta.le) if meta.le is not None else int(meta.lt) - 1 if meta.lt is not None else high
+            most = (
+                int(meta.le)
+                if meta.le is not None
+                else int(meta.lt) - 1
+                if meta.lt is not None
+                else high
+            )
             if least > low or most < high:
                 limited = f"limited_{len(self.names)}"
                 self.names[limited] = partial(_limited, field.name, least, most)

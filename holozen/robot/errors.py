@@ -7,7 +7,8 @@ MAX_MESSAGE = 2000  # characters of a message
 
 
 class RobotError(Failure, ValueError):
-    """A robot cannot be used as written. One line: where, what is wrong, what is allowed, what to do.
+    """A robot cannot be used as written. One line: where, what is wrong, what is allowed, what to
+    do.
 
     A message is truncated to MAX_MESSAGE characters.
     """

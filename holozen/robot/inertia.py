@@ -1,16 +1,14 @@
-"""Mass and inertia: moments of inertia that a file omits or gets wrong, and links without mass."""
+"""Mass and inertia: the moments of solid shapes, what is impossible or absurd of a tensor, and
+links without mass.
+"""
 
 from collections.abc import Iterable, Mapping
-from itertools import chain
 
 import numpy as np
 from msgspec.structs import replace
 
-from holozen.robot.elements import Source, Tag
-from holozen.robot.model import Drive, Joint, Link, Moments, Planar, Pose, Shape, descend, sides_of
-from holozen.robot.rotation import Array, matrix_of, symmetric
-from holozen.robot.shapes import solid
-from holozen.suggest import cut, listed
+from holozen.robot.model import Joint, Link, Moments, Shape, descend, solid
+from holozen.robot.rotation import Array, matrix_of
 
 # Moments of inertia of solid shapes, per mass: kg m^2 per kg.
 
@@ -18,15 +16,22 @@ from holozen.suggest import cut, listed
 ABSURD = 64.0  # times smaller than those of the solid shape: an eighth of its radius of gyration
 
 Placed = tuple[Shape, Array, Array]
-"""A shape; its frame's position (3,) in metres, and rotation (3, 3) whose columns are the frame's axes."""
+"""A shape; its frame's position (3,) in metres, and rotation (3, 3) whose columns are the frame's
+axes.
+"""
 
 
 def moments(placed: Iterable[Placed]) -> Array | None:
-    """The tensor (3, 3) in m^2 about the centre of all shapes, solid and of equal density; None without any.
+    """The tensor (3, 3) in m^2 about the centre of all shapes, solid and of equal density; None
+    without any.
 
     A mesh or a hull counts as its bounding box. Planes and missing meshes are ignored.
     """
-    found = [part for shape, position, rotation in placed if (part := _part(solid(shape), position, rotation))]
+    found = [
+        part
+        for shape, position, rotation in placed
+        if (part := _part(solid(shape), position, rotation))
+    ]
     whole = sum(volume for volume, _, _ in found)
     if not found:
         return None
@@ -39,20 +44,28 @@ def moments(placed: Iterable[Placed]) -> Array | None:
 
 
 def is_absurd(tensor: Array, mass: float, least: Array) -> bool:
-    """Whether a tensor in kg m^2 is far below that of a solid body, `least` in m^2, about any of its axes."""
+    """Whether a tensor in kg m^2 is far below that of a solid body, `least` in m^2, about any of
+    its axes.
+    """
     given, own = np.linalg.eigvalsh(tensor), np.linalg.eigvalsh(least)
     return bool((given * ABSURD < mass * own).any())
 
 
 def _part(shape: Shape, position: Array, rotation: Array) -> tuple[float, Array, Array] | None:
-    """Volume in m^3, centre (3,) in metres and tensor (3, 3) per mass of one shape; None if it has no volume."""
+    """Volume in m^3, centre (3,) in metres and tensor (3, 3) per mass of one shape; None if it has
+    no volume.
+    """
     middle, (x, y, z), volume = np.zeros(3), (0.0, 0.0, 0.0), 0.0
     if shape.kind == "box":
         x, y, z = (edge * edge / 12 for edge in shape.size)
         volume = float(np.prod(shape.size))
     elif shape.kind == "hull":
         low, high = np.min(shape.points, axis=0), np.max(shape.points, axis=0)
-        middle, (x, y, z), volume = (low + high) / 2, (high - low) ** 2 / 12, float(np.prod(high - low))
+        middle, (x, y, z), volume = (
+            (low + high) / 2,
+            (high - low) ** 2 / 12,
+            float(np.prod(high - low)),
+        )
     elif shape.kind == "cylinder":
         radius, length = shape.size
         x, y, z = radius * radius / 4, radius * radius / 4, length * length / 12
@@ -81,9 +94,9 @@ def impossible(inertia: Moments) -> str:
     xx, xy, xz, yy, yz, zz = inertia
     if not positive_definite(xx, xy, xz, yy, yz, zz):
         return "is zero or not positive definite"
-    # The triangle inequality, for any axes: the second moments of mass, half the trace minus the tensor, are
-    # not negative (P. Wensing et al., "Linear matrix inequalities for physically consistent inertial parameter
-    # identification", IEEE Robotics and Automation Letters 3, 2018).
+    # The triangle inequality, for any axes: the second moments of mass, half the trace minus the
+    # tensor, are not negative (P. Wensing et al., "Linear matrix inequalities for physically
+    # consistent inertial parameter identification", IEEE Robotics and Automation Letters 3, 2018).
     half = (xx + yy + zz) * (0.5 + ROUNDING)
     if not positive_definite(half - xx, -xy, -xz, half - yy, -yz, half - zz):
         return f"has one moment above the sum of the other two (ixx={xx:g}, iyy={yy:g}, izz={zz:g})"
@@ -96,64 +109,15 @@ def impossible(inertia: Moments) -> str:
 NO_INERTIA = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def read_inertia(inertial: Tag) -> Moments:
-    """The tensor of an `<inertial>` in kg m^2; NO_INERTIA for an impossible one: rejecting those would stop many
-    students' robots. Raises RobotError.
-    """
-    given = inertial.child("inertia")
-    tensor = _tensor(given)
-    xx, _, _, yy, _, zz = tensor
-    if min(xx, yy, zz) < 0:
-        raise given.wrong(f"has ixx={xx}, iyy={yy}, izz={zz}; a moment of inertia is never negative")
-    return NO_INERTIA if impossible(tensor) else tensor
-
-
-def _tensor(given: Tag) -> Moments:
-    """The tensor of an `<inertia>`. Omitted values are 0, in SDF 1 on the diagonal."""
-    xx, yy, zz = (given.number(name, 1.0 if given.sdf else 0.0) for name in ("ixx", "iyy", "izz"))
-    xy, xz, yz = (given.number(name, 0.0) for name in ("ixy", "ixz", "iyz"))
-    return xx, xy, xz, yy, yz, zz
-
-
-def with_moments(link: Link, inertial: Tag | None, source: Source, silent: bool = False) -> Link:
-    """The link; with the moments of inertia of its solid collision shapes if its own are NO_INERTIA or absurdly small,
-    and a warning unless `silent`. A link without such shapes is unchanged: without inertia it is a point mass.
-    """
-    part = link.inertial
-    if inertial is None or part is None or not part.mass or not (link.collisions or part.inertia == NO_INERTIA):
-        return link
-    least = of_shapes(link)
-    if part.inertia != NO_INERTIA and (
-        least is None or not is_absurd(symmetric(part.inertia), part.mass, symmetric(least))
-    ):
-        return link
-    if not silent:
-        _warn(link, inertial, least is not None, source)
-    if least is None:
-        return link
-    xx, xy, xz, yy, yz, zz = (part.mass * value for value in least)
-    return replace(link, inertial=replace(part, pose=Pose(part.pose.xyz), inertia=(xx, xy, xz, yy, yz, zz)))
-
-
-def _warn(link: Link, inertial: Tag, shaped: bool, source: Source) -> None:
-    given, part = inertial.first("inertia"), link.inertial
-    if part and part.inertia != NO_INERTIA:
-        wrong = "is absurdly small for the size of the link's collision shapes"
-    elif given is None:
-        wrong = "has no <inertia>"
-    else:
-        wrong = f"{impossible(_tensor(given))}, which is impossible"
-    taken = "the inertia of its solid collision shapes is used" if shaped else "the link is treated as a point mass"
-    source.warn(given or inertial, f"{wrong}; {taken}")
-
-
 def of_shapes(link: Link) -> Moments | None:
-    """The moments per mass of a link's solid collision shapes, (ixx, ixy, ixz, iyy, iyz, izz) in m^2 about their
-    centre, in the link's axes; None without any.
+    """The moments per mass of a link's solid collision shapes, (ixx, ixy, ixz, iyy, iyz, izz) in
+    m^2 about their centre, in the link's axes; None without any.
     """
     if not link.collisions:
         return None
-    placed = ((shape, np.array(shape.pose.xyz), matrix_of(shape.pose.rpy)) for shape in link.collisions)
+    placed = (
+        (shape, np.array(shape.pose.xyz), matrix_of(shape.pose.rpy)) for shape in link.collisions
+    )
     found = moments(placed)
     if found is None:
         return None
@@ -161,9 +125,9 @@ def of_shapes(link: Link) -> Moments | None:
     return xx, xy, xz, yy, yz, zz
 
 
-# Links without mass. Gazebo Classic drops them, and so do we, by the rule of sdformat's src/parser_urdf.cc
-# (CreateSDF): links connected by fixed joints are one body; a body without mass is dropped, with its joint and
-# everything attached to it.
+# Links without mass. Gazebo Classic drops them, and so do we, by the rule of sdformat's
+# src/parser_urdf.cc (CreateSDF): links connected by fixed joints are one body; a body without mass
+# is dropped, with its joint and everything attached to it.
 
 
 LIGHTEST = 1e-6  # kg; treated as zero by ignition::math::equal
@@ -175,7 +139,7 @@ def massless(links: Mapping[str, Link], joints: Mapping[str, Joint], root: str) 
     A robot without any mass keeps all its links: it can be displayed but not driven.
     """
     order = [*descend(root, joints)]
-    masses = _lumped(links, order)
+    masses = lumped(links, order)
     if all(mass <= LIGHTEST for mass in masses.values()):
         return {}
     lost: dict[str, str] = {}
@@ -187,60 +151,13 @@ def massless(links: Mapping[str, Link], joints: Mapping[str, Joint], root: str) 
     return lost
 
 
-def _lumped(links: Mapping[str, Link], order: list[Joint]) -> dict[str, float]:
+def lumped(links: Mapping[str, Link], order: list[Joint]) -> dict[str, float]:
     """Link -> its mass plus that of everything fixed to it. `order` is that of `descend`."""
     masses = {name: link.inertial.mass if link.inertial else 0.0 for name, link in links.items()}
     for joint in reversed(order):
         if joint.kind == "fixed":
             masses[joint.parent] += masses[joint.child]
     return masses
-
-
-def warn_massless(
-    robot: Tag, links: Mapping[str, Link], joints: Mapping[str, Joint], lost: Mapping[str, str], source: Source
-) -> None:
-    """Warn about each branch that is left out, and each link whose <inertial> has no mass."""
-    above = {joint.child: joint.name for joint in joints.values()}
-    branches: dict[str, list[str]] = {}
-    for name, top in lost.items():
-        branches.setdefault(top, []).append(name)
-    for tag in robot.all("link"):
-        name = tag.word("name")
-        inertial = links[name].inertial
-        if name in branches:
-            below = [other for other in branches[name] if other != name]
-            also = f" and the links below it: {listed(below)}" if below else ""
-            problem = f"has no mass, so it is left out, as in Gazebo, with the joint {cut(above[name])}{also}"
-            source.warn(tag, f"{problem}; give it an <inertial>")
-        elif name not in lost and inertial is not None and inertial.mass == 0:
-            source.warn(tag.first("inertial") or tag, "has no mass; the link is treated as massless, with no inertia")
-
-
-def check_drive(
-    robot: Tag,
-    drive: Drive | None,
-    links: Mapping[str, Link],
-    joints: Mapping[str, Joint],
-    root: str,
-    lost: Mapping[str, str],
-    source: Source,
-) -> None:
-    """Raise RobotError if a drive needs a joint that is left out, or wheels have to push a root without mass.
-
-    A root without mass that no wheels push only causes a warning.
-    """
-    tags = {tag.word("name"): tag for tag in robot.all("link")}
-    for name in chain(*sides_of(drive.mechanism)) if drive else ():
-        child = joints[name].child
-        if child in lost:
-            problem = f"has no mass, so the joint {cut(name)} is left out, as in Gazebo, but the drive needs it"
-            raise tags[lost[child]].wrong(f"{problem}; give it an <inertial>")
-    masses = _lumped(links, [*descend(root, joints)])
-    if masses[root] <= LIGHTEST and any(mass > LIGHTEST for mass in masses.values()):
-        problem = "is the root and has no mass, nor have the links fixed to it; Gazebo drops such a robot"
-        if drive is not None and not isinstance(drive.mechanism, Planar):
-            raise tags[root].wrong(f"{problem}: give it an <inertial>")
-        source.warn(tags[root], f"{problem}, but it is kept here: give it an <inertial>")
 
 
 def without(

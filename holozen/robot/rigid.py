@@ -1,4 +1,6 @@
-"""A robot as rigid bodies: frames, lumped masses and shapes, moving parts, and its height above the ground."""
+"""A robot as rigid bodies: frames, lumped masses and shapes, moving parts, and its height above the
+ground.
+"""
 
 import math
 from collections.abc import Mapping
@@ -7,37 +9,52 @@ from functools import lru_cache
 import numpy as np
 from msgspec import Struct
 
-from holozen.robot.elements import Vector
 from holozen.robot.errors import RobotError
 from holozen.robot.inertia import is_absurd, moments
 from holozen.robot.model import (
     HERE,
     MOVING,
+    Balancing,
+    Differential,
     Inertial,
     Joint,
+    Link,
     Mecanum,
     Planar,
     Pose,
     RobotModel,
     Shape,
     Surface,
+    Vector,
     descend,
+    sides_of,
+    solid,
 )
-from holozen.robot.rotation import Array, matrix_of, principal, quaternion_of, rpy_of, symmetric, triple
-from holozen.robot.shapes import solid
+from holozen.robot.rotation import (
+    Array,
+    matrix_of,
+    principal,
+    quaternion_of,
+    rpy_of,
+    symmetric,
+    triple,
+)
 from holozen.rotation import XYZ, XYZW, conjugate, from_axis_angle, multiply, rotate
 from holozen.suggest import cut
 
 SMALLEST_MASS = 1e-6  # kg; an engine divides by the mass
 SMALLEST_GYRATION = 1e-3  # m; and by the moments of inertia, of which a point mass would have none
-MAX_JOINTS = 120  # parts of a robot, each with a joint or the root; pybullet silently stops at 127 joints
+# parts of a robot, each with a joint or the root; pybullet silently stops at 127 joints
+MAX_JOINTS = 120
 MAX_SHAPES = 500  # of one entity: each that touches the ground costs the engine 50 us at every step
 FALLS = "has no collision shape and falls through the ground"
 FLEETS = 8  # models whose results are cached, for all their copies
 
 
 class Frame(Struct, frozen=True, eq=False):
-    """A frame in another one: `position` (3,) in metres, `rotation` (3, 3) whose columns are its axes."""
+    """A frame in another one: `position` (3,) in metres, `rotation` (3, 3) whose columns are its
+    axes.
+    """
 
     position: Array
     rotation: Array
@@ -81,14 +98,18 @@ def compose(outer: Pose, inner: Pose) -> Pose:
 
 
 class Axis(Struct, frozen=True):
-    """A joint at zero in the root frame: its origin in metres and the unit vector it turns about or slides along."""
+    """A joint at zero in the root frame: its origin in metres and the unit vector it turns about or
+    slides along.
+    """
 
     xyz: Vector
     direction: Vector
 
 
 class PlacedShape(Struct, frozen=True):
-    """A collision shape of `link`; position in metres and quaternion x, y, z, w in the root frame."""
+    """A collision shape of `link`; position in metres and quaternion x, y, z, w in the root
+    frame.
+    """
 
     link: str
     shape: Shape
@@ -99,9 +120,9 @@ class PlacedShape(Struct, frozen=True):
 class Body(Struct, frozen=True):
     """One rigid body in the root frame.
 
-    `mass` in kg, `centre` of mass in metres, principal moments `inertia` in kg m^2 about it, and their axes
-    as the quaternion x, y, z, w `axes`, which rotates the principal frame into the root frame. `weightless` is the
-    part of the mass in kg that gravity does not pull.
+    `mass` in kg, `centre` of mass in metres, principal moments `inertia` in kg m^2 about it, and
+    their axes as the quaternion x, y, z, w `axes`, which rotates the principal frame into the root
+    frame. `weightless` is the part of the mass in kg that gravity does not pull.
     """
 
     mass: float
@@ -112,7 +133,9 @@ class Body(Struct, frozen=True):
     weightless: float = 0.0
 
     def moment(self, axis: Vector) -> float:
-        """The moment of inertia in kg m^2 about an axis through the centre of mass, a unit vector in the root frame."""
+        """The moment of inertia in kg m^2 about an axis through the centre of mass, a unit vector
+        in the root frame.
+        """
         a, b, c = rotate(conjugate(self.axes), axis)
         x, y, z = self.inertia
         return x * a * a + y * b * b + z * c * c
@@ -132,7 +155,9 @@ def joint_axes(model: RobotModel) -> Mapping[str, Axis]:
     frames = link_frames(model)
     moving = [joint for joint in model.joints.values() if joint.kind in MOVING]
     return {
-        joint.name: Axis(frames[joint.child].xyz, triple(frames[joint.child].rotation @ np.array(joint.axis)))
+        joint.name: Axis(
+            frames[joint.child].xyz, triple(frames[joint.child].rotation @ np.array(joint.axis))
+        )
         for joint in moving
     }
 
@@ -146,18 +171,29 @@ def lump(model: RobotModel) -> Body:
     body = lump_links(model, link_frames(model))
     if body.mass < SMALLEST_MASS and not model.static:
         problem = f"robot {cut(model.name)} has a mass of {body.mass} kg"
-        raise RobotError(f"{problem}; give a link an <inertial> with a <mass> of {SMALLEST_MASS} kg or more")
+        raise RobotError(
+            f"{problem}; give a link an <inertial> with a <mass> of {SMALLEST_MASS} kg or more"
+        )
     return body
 
 
 def lump_links(model: RobotModel, frames: Mapping[str, Frame]) -> Body:
-    """The links in `frames` as one body, in the frame that `frames` are relative to. Moments of inertia far below those
-    of its solid shapes are replaced by theirs: in an engine such a body would spin.
+    """The links in `frames` as one body, in the frame that `frames` are relative to. Moments of
+    inertia far below those of its solid shapes are replaced by theirs: in an engine such a body
+    would spin.
     """
     links = [model.links[name] for name in frames]
-    parts = [(frames[link.name] @ Frame.of(link.inertial.pose), link.inertial) for link in links if link.inertial]
+    parts = [
+        (frames[link.name] @ Frame.of(link.inertial.pose), link.inertial)
+        for link in links
+        if link.inertial
+    ]
     mass, centre, inertia = _sum(parts)
-    placed = [(link, shape, frames[link.name] @ Frame.of(shape.pose)) for link in links for shape in link.collisions]
+    placed = [
+        (link, shape, frames[link.name] @ Frame.of(shape.pose))
+        for link in links
+        for shape in link.collisions
+    ]
     least = moments((shape, frame.position, frame.rotation) for _, shape, frame in placed)
     if least is not None and is_absurd(inertia, mass, least):
         inertia = mass * least
@@ -165,7 +201,9 @@ def lump_links(model: RobotModel, frames: Mapping[str, Frame]) -> Body:
     principals = np.maximum(principals, mass * SMALLEST_GYRATION**2)
     collisions = tuple(placed_shape(link.name, shape, frame) for link, shape, frame in placed)
     weightless = sum(link.inertial.mass for link in links if link.inertial and not link.gravity)
-    return Body(mass, triple(centre), triple(principals), quaternion_of(axes), collisions, weightless)
+    return Body(
+        mass, triple(centre), triple(principals), quaternion_of(axes), collisions, weightless
+    )
 
 
 def placed_shape(link: str, shape: Shape, frame: Frame) -> PlacedShape:
@@ -192,8 +230,9 @@ def _sum(parts: list[tuple[Frame, Inertial]]) -> tuple[float, Array, Array]:
 class Part(Struct, frozen=True):
     """Links that move together, in the frame of the topmost, `link`.
 
-    `joint` moves it, None for the root's part; `parent` is the index of the part that carries it. `xyz` in metres and
-    the quaternion x, y, z, w `rotation` are its pose in that part's frame, with its joint at zero.
+    `joint` moves it, None for the root's part; `parent` is the index of the part that carries it.
+    `xyz` in metres and the quaternion x, y, z, w `rotation` are its pose in that part's frame, with
+    its joint at zero.
     """
 
     link: str
@@ -206,7 +245,9 @@ class Part(Struct, frozen=True):
 
 
 def assemble(model: RobotModel) -> list[Part]:
-    """The parts, every parent before its children, the root's first. A joint that moves no mass is treated as fixed."""
+    """The parts, every parent before its children, the root's first. A joint that moves no mass is
+    treated as fixed.
+    """
     above = {joint.child: joint for joint in model.joints.values()}
     tops, within = _grouped(model)
     order, parts = list(within), list[Part]()
@@ -218,18 +259,51 @@ def assemble(model: RobotModel) -> list[Part]:
         joint = above[top]
         carrier = tops[joint.parent]
         frame = within[carrier][joint.parent] @ Frame.of(joint.pose)
-        parts.append(Part(top, body, surface, joint, order.index(carrier), frame.xyz, frame.quaternion))
+        parts.append(
+            Part(top, body, surface, joint, order.index(carrier), frame.xyz, frame.quaternion)
+        )
     return parts
 
 
+def advised_drive(model: RobotModel) -> str:
+    """What `--drive` should be for a robot without a drive: omni if its wheels are omni or mecanum
+    wheels, with rollers or with axles in different directions, else planar_move.
+    """
+    rims = {joint.child for joint in model.joints.values() if joint.kind == "continuous"}
+    carriers = {
+        joint.parent
+        for joint in model.joints.values()
+        if joint.kind == "continuous" and joint.parent in rims
+    }
+    if len(carriers) >= 3:
+        return "omni"
+    wheels = [
+        joint.name
+        for joint in model.joints.values()
+        if joint.kind == "continuous" and joint.parent not in rims
+    ]
+    axles = [np.array(joint_axes(model)[name].direction) for name in wheels]
+    level = [axle for axle in axles if abs(axle[2]) < 0.1]
+    crossed = any(float(np.linalg.norm(np.cross(axle, level[0]))) > 0.2 for axle in level[1:])
+    return "omni" if len(level) >= 3 and crossed else "planar_move"
+
+
 def in_parts(model: RobotModel) -> dict[str, tuple[int, Frame]]:
-    """Link name -> the index of its part among those of `assemble`, and its frame in that part's."""
+    """Link name -> the index of its part among those of `assemble`, and its frame in that
+    part's.
+    """
     _, within = _grouped(model)
-    return {link: (index, frame) for index, links in enumerate(within.values()) for link, frame in links.items()}
+    return {
+        link: (index, frame)
+        for index, links in enumerate(within.values())
+        for link, frame in links.items()
+    }
 
 
 def _grouped(model: RobotModel) -> tuple[dict[str, str], dict[str, dict[str, Frame]]]:
-    """The topmost link of each link's part, and for each of those the frames of its part's links."""
+    """The topmost link of each link's part, and for each of those the frames of its part's
+    links.
+    """
     moving = _moving(model)
     tops, within = {model.root: model.root}, {model.root: {model.root: Frame.of(HERE)}}
     for joint in descend(model.root, model.joints):
@@ -242,8 +316,8 @@ def _grouped(model: RobotModel) -> tuple[dict[str, str], dict[str, dict[str, Fra
 
 
 def moved_by(joint: Joint, at: XYZ, rotation: XYZW, position: float) -> tuple[XYZ, XYZW]:
-    """The pose of a joint's child in its parent (m, quaternion) at a joint `position` in rad, or in m for a prismatic
-    joint; `at` and `rotation` are the pose at zero.
+    """The pose of a joint's child in its parent (m, quaternion) at a joint `position` in rad, or in
+    m for a prismatic joint; `at` and `rotation` are the pose at zero.
     """
     if joint.kind == "prismatic":
         (x, y, z), (dx, dy, dz) = at, rotate(rotation, joint.axis)
@@ -252,11 +326,16 @@ def moved_by(joint: Joint, at: XYZ, rotation: XYZW, position: float) -> tuple[XY
 
 
 def simulated_parts(model: RobotModel) -> list[Part]:
-    """The parts of a robot that an engine can simulate. Raises RobotError for no mass, or too many joints."""
+    """The parts of a robot that an engine can simulate. Raises RobotError for no mass, or too many
+    joints.
+    """
     parts = assemble(model)
     if parts[0].body.mass < SMALLEST_MASS and not model.static:
         solid = next((link.name for link in model.links.values() if link.collisions), parts[0].link)
-        problem = f"{cut(model.name)} has no mass: neither {parts[0].link!r} nor any link fixed to it has one"
+        problem = (
+            f"{cut(model.name)} has no mass: neither {parts[0].link!r} nor any link fixed "
+            "to it has one"
+        )
         raise RobotError(f"{problem}; give {solid!r} an <inertial>")
     if len(parts) > MAX_JOINTS:
         problem = f"{cut(model.name)} has {len(parts) - 1} moving joints"
@@ -265,7 +344,9 @@ def simulated_parts(model: RobotModel) -> list[Part]:
 
 
 def check_simulated(model: RobotModel) -> None:
-    """Raise RobotError for a robot that an engine cannot simulate: without mass, or with too many parts."""
+    """Raise RobotError for a robot that an engine cannot simulate: without mass, or with too many
+    parts.
+    """
     check_shapes(model)
     if model.drive and not model.static and isinstance(model.drive.mechanism, Planar | Mecanum):
         lump(model)
@@ -276,18 +357,26 @@ def check_simulated(model: RobotModel) -> None:
 def check_shapes(model: RobotModel) -> None:
     """Raise RobotError for more than MAX_SHAPES collision shapes."""
     if (shapes := sum(len(link.collisions) for link in model.links.values())) > MAX_SHAPES:
-        raise RobotError(f"{cut(model.name)} has {shapes} collision shapes; at most {MAX_SHAPES} are simulated")
+        raise RobotError(
+            f"{cut(model.name)} has {shapes} collision shapes; at most {MAX_SHAPES} are simulated"
+        )
 
 
 def falls_through(model: RobotModel) -> bool:
     """Whether gravity pulls a robot that has no collision shape to stand on."""
     links = model.links.values()
-    return not model.static and not any(link.collisions for link in links) and any(link.gravity for link in links)
+    return (
+        not model.static
+        and not any(link.collisions for link in links)
+        and any(link.gravity for link in links)
+    )
 
 
 def _moving(model: RobotModel) -> set[str]:
     """The links that a joint moves. A massless link may still carry others with mass."""
-    masses = {name: link.inertial.mass if link.inertial else 0.0 for name, link in model.links.items()}
+    masses = {
+        name: link.inertial.mass if link.inertial else 0.0 for name, link in model.links.items()
+    }
     found = set()
     for joint in reversed([*descend(model.root, model.joints)]):
         if joint.kind in MOVING and masses[joint.child] >= SMALLEST_MASS:
@@ -298,7 +387,9 @@ def _moving(model: RobotModel) -> set[str]:
 
 
 def _surface(model: RobotModel, links: dict[str, Frame]) -> Surface:
-    """The surface of the first link with a surface and collision shapes: an engine has one surface per part."""
+    """The surface of the first link with a surface and collision shapes: an engine has one surface
+    per part.
+    """
     touching = [model.links[name] for name in links if model.links[name].collisions]
     return next((link.surface for link in touching if link.surface != Surface()), Surface())
 
@@ -311,8 +402,8 @@ DOWN = np.array((0.0, 0.0, -1.0))
 
 
 def farthest(shape: Shape, way: Array) -> Array | None:
-    """The point (3,) of a shape that is farthest along a unit vector, both in its own frame; None for a shape without
-    extent: a plane, or a missing mesh.
+    """The point (3,) of a shape that is farthest along a unit vector, both in its own frame; None
+    for a shape without extent: a plane, or a missing mesh.
     """
     x, y, z = way.tolist()
     match shape.kind:
@@ -325,32 +416,112 @@ def farthest(shape: Shape, way: Array) -> Array | None:
         case "sphere":
             return shape.size[0] * way
         case "hull" if shape.points:
-            return np.array(max(shape.points, key=lambda point: point[0] * x + point[1] * y + point[2] * z))
+            return np.array(
+                max(shape.points, key=lambda point: point[0] * x + point[1] * y + point[2] * z)
+            )
     return None
 
 
 def reach_along(frame: Frame, shape: Shape, way: Array) -> float:
-    """How far in metres a shape in a frame reaches along a unit vector; minus infinity for one without extent."""
+    """How far in metres a shape in a frame reaches along a unit vector; minus infinity for one
+    without extent.
+    """
     found = farthest(shape, way @ frame.rotation)
     return -math.inf if found is None else float((frame.position + frame.rotation @ found) @ way)
 
 
 def lowest(model: RobotModel, rpy: Vector = LEVEL) -> float:
-    """z in metres of the lowest collision point under the root frame, with all joints at zero and the root turned by
-    `rpy` in radians; 0 without collision shapes.
+    """z in metres of the lowest collision point under the root frame, with all joints at zero and
+    the root turned by `rpy` in radians; 0 without collision shapes.
     """
     down, frames = Frame.of(Pose(rpy=rpy)).rotation.T @ DOWN, link_frames(model)
-    shapes = [(frames[link.name], shape) for link in model.links.values() for shape in link.collisions]
-    depth = max((reach_along(frame @ Frame.of(shape.pose), solid(shape), down) for frame, shape in shapes), default=0.0)
+    shapes = [
+        (frames[link.name], shape) for link in model.links.values() for shape in link.collisions
+    ]
+    depth = max(
+        (reach_along(frame @ Frame.of(shape.pose), solid(shape), down) for frame, shape in shapes),
+        default=0.0,
+    )
     return 0.0 - depth if math.isfinite(depth) else 0.0  # 0 and not -0, for printing
 
 
 def reach(part: PlacedShape) -> float:
     """The distance in m from the root frame to the farthest point of a shape, or an upper bound."""
     if part.shape.points:
-        return max(math.dist(part.xyz, rotate(part.quaternion, (-x, -y, -z))) for x, y, z in part.shape.points)
+        return max(
+            math.dist(part.xyz, rotate(part.quaternion, (-x, -y, -z)))
+            for x, y, z in part.shape.points
+        )
     if part.shape.kind == "cylinder":
         radius, length = part.shape.size
         x, y, z = rotate(conjugate(part.quaternion), part.xyz)
         return math.hypot(math.hypot(x, y) + radius, abs(z) + length / 2)
-    return math.hypot(*part.xyz) + math.hypot(*part.shape.size) / (2 if part.shape.kind == "box" else 1)
+    return math.hypot(*part.xyz) + math.hypot(*part.shape.size) / (
+        2 if part.shape.kind == "box" else 1
+    )
+
+
+AROUND = 64  # directions in which a footprint is measured
+
+
+@lru_cache(FLEETS)
+def turning_point(model: RobotModel) -> Vector:
+    """The point (m, root frame) that a robot turns about on the spot: the middle of the wheels of a
+    differential or balancing drive, else the origin.
+    """
+    mechanism = model.drive.mechanism if model.drive else None
+    if not isinstance(mechanism, Differential | Balancing):
+        return 0.0, 0.0, 0.0
+    frames, sides = link_frames(model), sides_of(mechanism)
+    middles = [
+        np.mean([frames[model.joints[name].child].position for name in side], axis=0)
+        for side in sides
+    ]
+    return triple((middles[0] + middles[1]) / 2)
+
+
+@lru_cache(FLEETS)
+def footprint_radius(model: RobotModel) -> float:
+    """The radius (m) of a circle on the ground, around the `turning_point`, that holds all
+    collision shapes, with all joints at zero; 0 without shapes.
+    """
+    frames, centre = link_frames(model), np.array(turning_point(model))
+    shapes = [
+        (frames[link.name] @ Frame.of(shape.pose), solid(shape))
+        for link in model.links.values()
+        for shape in link.collisions
+    ]
+    angles = (math.tau * index / AROUND for index in range(AROUND))
+    ways = [np.array((math.cos(angle), math.sin(angle), 0.0)) for angle in angles]
+    reach = max(
+        (reach_along(*one, way) - centre @ way for one in shapes for way in ways), default=0
+    )
+    return float(reach / math.cos(math.pi / AROUND)) if 0 < reach < math.inf else 0.0
+
+
+ROUND = ("cylinder", "sphere")
+MEASURABLE = ("box", *ROUND)  # kinds of visual shapes
+
+
+def radius_across(link: Link, axle: Vector) -> float:
+    """Half of the link's larger extent across its axle, a unit vector in the link's frame, in
+    metres; 0 without shapes.
+
+    Measured on the collision shapes, else on visual shapes other than meshes.
+    """
+    shapes = link.collisions or [shape for shape in link.visuals if shape.kind in MEASURABLE]
+    placed = [(Frame.of(shape.pose), solid(shape)) for shape in shapes]
+    along = np.array(axle)
+    aside = np.cross(along, np.eye(3)[np.abs(along).argmin()])
+    aside /= np.linalg.norm(aside)
+    ways = (aside, -aside), (np.cross(along, aside), np.cross(aside, along))
+    reaches = [
+        [max((reach_along(*part, way) for part in placed), default=0.0) for way in both]
+        for both in ways
+    ]
+    return max(0.0, *map(sum, reaches)) / 2
+
+
+def round_radius(link: Link) -> float:
+    """The radius of the first round collision shape in metres; 0 without one."""
+    return next((shape.size[0] for shape in link.collisions if shape.kind in ROUND), 0.0)

@@ -1,4 +1,6 @@
-"""Rotation matrices and inertia tensors as numpy arrays, in radians; quaternions are those of `holozen.rotation`."""
+"""Rotation matrices and inertia tensors as numpy arrays, in radians; quaternions are those of
+`holozen.rotation`.
+"""
 
 from collections.abc import Sequence
 from itertools import permutations
@@ -13,7 +15,9 @@ Array = npt.NDArray[np.float64]
 
 
 def matrix_of(rpy: Sequence[float]) -> Array:
-    """URDF's rotation: roll about the fixed x, then pitch about y, then yaw about z, so Rz Ry Rx."""
+    """URDF's rotation: roll about the fixed x, then pitch about y, then yaw about z, so Rz Ry
+    Rx.
+    """
     cr, cp, cy = np.cos(rpy)
     sr, sp, sy = np.sin(rpy)
     return np.array(
@@ -32,8 +36,9 @@ def rpy_of(matrix: Array) -> XYZ:
 
 def quaternion_of(matrix: Array) -> XYZW:
     """The unit quaternion of a rotation matrix, with w >= 0."""
-    # Each row is 4 times one component times all four. The row with the largest square loses no digits
-    # (S. W. Shepperd, "Quaternion from rotation matrix", Journal of Guidance and Control 1, 1978).
+    # Each row is 4 times one component times all four. The row with the largest square loses no
+    # digits (S. W. Shepperd, "Quaternion from rotation matrix", Journal of Guidance and Control 1,
+    # 1978).
     (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
     rows = np.array(
         [
@@ -50,14 +55,17 @@ def quaternion_of(matrix: Array) -> XYZW:
 
 
 def principal(inertia: Array) -> tuple[Array, Array]:
-    """Principal moments (3,) of a symmetric 3x3 tensor, and the rotation whose columns are their axes.
+    """Principal moments (3,) of a symmetric 3x3 tensor, and the rotation whose columns are their
+    axes.
 
-    Of the 24 right-handed ways to name the axes, the one nearest to x, y, z: for a tensor that is diagonal already,
-    the rotation is the identity.
+    Of the 24 right-handed ways to name the axes, the one nearest to x, y, z: for a tensor that is
+    diagonal already, the rotation is the identity.
     """
     noise = 1e-12 * np.trace(inertia)
     moments, axes = np.linalg.eigh(np.where(np.abs(inertia) > noise, inertia, 0.0))
-    order = list(max(permutations(range(3)), key=lambda order: np.abs(np.diag(axes[:, list(order)])).sum()))
+    order = list(
+        max(permutations(range(3)), key=lambda order: np.abs(np.diag(axes[:, list(order)])).sum())
+    )
     moments, axes = moments[order], axes[:, order]
     axes = axes * np.where(np.diag(axes) < 0, -1.0, 1.0)
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])  # right-handed, whatever the signs

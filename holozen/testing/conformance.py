@@ -1,17 +1,17 @@
-"""The promises that every base keeps that obeys `cmd_vel`. Test a robot for them before people stand beside it.
+"""The promises that every base keeps that obeys `cmd_vel`. Test a robot for them before people
+stand beside it.
 
-    @pytest.fixture(scope="module")
-    def probe():
+    @pytest.fixture(scope="module") def probe():
         with Wire() as wire:
-            wire.start("sim")  # or your base
-            yield Probe(wire.bus)
+            wire.start("sim")  # or your base yield Probe(wire.bus)
 
-    @pytest.mark.parametrize("promise", PROMISES, ids=name)
-    def test_the_base_keeps_its_promises(promise, probe):
+    @pytest.mark.parametrize("promise", PROMISES, ids=name) def
+    test_the_base_keeps_its_promises(promise, probe):
         promise(probe)
 
-For a base that is running, `python -m holozen.testing.conformance [ROBOT]` does the same. The robot moves, forward and
-back at `speed` (m/s), for a few seconds at a time. Each promise raises AssertionError with what was seen instead.
+For a base that is running, `python -m holozen.testing.conformance [ROBOT]` does the same. The robot
+moves, forward and back at `speed` (m/s), for a few seconds at a time. Each promise raises
+AssertionError with what was seen instead.
 """
 
 import argparse
@@ -36,7 +36,8 @@ from holozen.wire import COMMAND_SILENCE, key_for
 
 SPEED = 0.1  # m/s
 PATIENCE = 10.0  # s for a base to begin to move; it may be held up
-SETTLING = 3.0  # s from the last command to rest: COMMAND_SILENCE, its braking, and what a busy machine adds
+# s from the last command to rest: COMMAND_SILENCE, its braking, and what a busy machine adds
+SETTLING = 3.0
 LOOK = 1.0  # s for which a base that must not move is watched
 EVERY = 0.05  # s between two commands, as a teleop sends them
 SCRIPTED = 5  # commands by the script for each one by the person, while both command
@@ -45,12 +46,15 @@ AGREES = 0.25  # share of the distance by which pose and twist of the odometry m
 
 
 class Probe:
-    """A base, by its robot's name, and its two drivers: a script and a person. `connect` opens a bus for a node's name.
+    """A base, by its robot's name, and its two drivers: a script and a person. `connect` opens a
+    bus for a node's name.
 
     The base is driven at `speed` (m/s); slower than a fifth of that counts as rest.
     """
 
-    def __init__(self, connect: Callable[[str], Bus], robot: str = "", speed: float = SPEED) -> None:
+    def __init__(
+        self, connect: Callable[[str], Bus], robot: str = "", speed: float = SPEED
+    ) -> None:
         self.speed, self._robot, self._bus = speed, robot, connect("conformance")
         self.odom = self._bus.subscribe(key_for("odom", robot), Odometry, depth=4096)
         key = key_for("cmd_vel", robot)
@@ -70,7 +74,9 @@ class Probe:
     def watch(
         self, seconds: float, meanwhile: Callable[[], object] = lambda: None, every: float = EVERY
     ) -> list[Odometry]:
-        """All odoms of the next `seconds`, during which `meanwhile` is called every `every` seconds."""
+        """All odoms of the next `seconds`, during which `meanwhile` is called every `every`
+        seconds.
+        """
         found, end, due = list[Odometry](), time.monotonic() + seconds, 0.0
         while (now := time.monotonic()) <= end:
             if now >= due:
@@ -81,7 +87,9 @@ class Probe:
         return found + self._read()
 
     def drive(self, commands: Callable[[], object], way: int, every: float = EVERY) -> None:
-        """Call `commands` every `every` seconds until the robot moves forward (`way` 1) or back (-1)."""
+        """Call `commands` every `every` seconds until the robot moves forward (`way` 1) or back
+        (-1).
+        """
         due = 0.0
 
         def moves() -> bool:
@@ -91,7 +99,9 @@ class Probe:
                 due = time.monotonic() + every
             return any(way * odom.twist.twist.linear.x > self.speed / 2 for odom in self._read())
 
-        wait_for(moves, PATIENCE, f"the robot to move {'forward' if way > 0 else 'back'} as commanded")
+        wait_for(
+            moves, PATIENCE, f"the robot to move {'forward' if way > 0 else 'back'} as commanded"
+        )
 
     def rest(self, why: str, within: float = SETTLING) -> None:
         """Wait until the robot rests."""
@@ -113,7 +123,9 @@ class Probe:
             pass
 
     def _read(self) -> list[Odometry]:
-        found = [received.message for received in iter(self.odom.try_recv, None) if received.message]
+        found = [
+            received.message for received in iter(self.odom.try_recv, None) if received.message
+        ]
         self._last = found[-1] if found else getattr(self, "_last", Odometry())
         return found
 
@@ -132,7 +144,9 @@ def it_stops_at_once_on_command(probe: Probe) -> None:
 
 
 def it_refuses_impossible_speeds(probe: Probe) -> None:
-    """NaN, infinity and an absurd speed move nothing and leave odometry finite, and it obeys again afterwards."""
+    """NaN, infinity and an absurd speed move nothing and leave odometry finite, and it obeys again
+    afterwards.
+    """
     for bad in (math.nan, math.inf, 1e300):
         payload = encode(Twist.planar(probe.speed), "cdr").replace(
             struct.pack("<d", probe.speed), struct.pack("<d", bad)
@@ -141,9 +155,15 @@ def it_refuses_impossible_speeds(probe: Probe) -> None:
         seen = probe.watch(LOOK, send)
         assert seen, f"no odom after a speed of {bad}"
         for odom in seen:
-            numbers = (*odom.pose.pose.planar(), odom.twist.twist.linear.x, odom.twist.twist.linear.y)
+            numbers = (
+                *odom.pose.pose.planar(),
+                odom.twist.twist.linear.x,
+                odom.twist.twist.linear.y,
+            )
             assert all(map(math.isfinite, numbers)), f"odom has {numbers} after a speed of {bad}"
-            assert probe.rests(odom), f"the robot moves at {numbers[3]:g} m/s after a speed of {bad}"
+            assert probe.rests(odom), (
+                f"the robot moves at {numbers[3]:g} m/s after a speed of {bad}"
+            )
     it_obeys_and_stops_in_silence(probe)
 
 
@@ -164,13 +184,16 @@ def a_person_comes_first(probe: Probe) -> None:
     for odom in seen:
         x = odom.twist.twist.linear.x
         assert x < 0, (
-            f"the robot moves at {x:g} m/s, while a person commands {-probe.speed:g} and a script the opposite"
+            f"the robot moves at {x:g} m/s, while a person commands {-probe.speed:g} and a script "
+            "the opposite"
         )
     probe.calm()
 
 
 def it_stands_while_it_is_stopped(probe: Probe) -> None:
-    """After the service `stop` no command moves it; after `release`, those of a source that has let go do."""
+    """After the service `stop` no command moves it; after `release`, those of a source that has let
+    go do.
+    """
     forward = partial(probe.script.put, Twist.planar(probe.speed))
     probe.drive(forward, 1)
     probe.call("stop")
@@ -181,7 +204,9 @@ def it_stands_while_it_is_stopped(probe: Probe) -> None:
         seen = probe.watch(LOOK, forward)
         assert seen, "no odom while it is stopped"
         moving = [odom for odom in seen if not probe.rests(odom)]
-        assert not moving, f"the robot moves at {moving[0].twist.twist.linear.x:g} m/s while it is stopped"
+        assert not moving, (
+            f"the robot moves at {moving[0].twist.twist.linear.x:g} m/s while it is stopped"
+        )
     finally:
         probe.call("release")
     probe.calm()
@@ -189,7 +214,9 @@ def it_stands_while_it_is_stopped(probe: Probe) -> None:
 
 
 def its_odometry_is_steady_and_agrees_with_itself(probe: Probe) -> None:
-    """odom comes at 10 Hz or more, with frames and increasing stamps, and its pose moves as its twist says."""
+    """odom comes at 10 Hz or more, with frames and increasing stamps, and its pose moves as its
+    twist says.
+    """
     probe.newest()
     seen = probe.watch(2 * LOOK, lambda: probe.script.put(Twist.planar(probe.speed)))
     stamps = [odom.header.stamp.seconds() for odom in seen]
@@ -200,17 +227,26 @@ def its_odometry_is_steady_and_agrees_with_itself(probe: Probe) -> None:
     assert seen[0].header.frame_id, "odom has no header.frame_id"
     assert seen[0].child_frame_id, "odom has no child_frame_id"
     speeds = [odom.twist.twist.linear.x for odom in seen[1:]]
-    way = sum(speed * (later - earlier) for speed, (earlier, later) in zip(speeds, pairwise(stamps), strict=True))
+    way = sum(
+        speed * (later - earlier)
+        for speed, (earlier, later) in zip(speeds, pairwise(stamps), strict=True)
+    )
     (x, y, _), (x1, y1, _) = seen[0].pose.pose.planar(), seen[-1].pose.pose.planar()
     went = math.hypot(x1 - x, y1 - y)
-    assert abs(went - abs(way)) <= AGREES * abs(way) + 0.01, f"its pose moved {went:.3f} m, its twist says {way:.3f} m"
+    assert abs(went - abs(way)) <= AGREES * abs(way) + 0.01, (
+        f"its pose moved {went:.3f} m, its twist says {way:.3f} m"
+    )
     probe.rest("after silence")
 
 
 PROMISES: tuple[Callable[[Probe], None], ...] = (
-    it_obeys_and_stops_in_silence, it_stops_at_once_on_command, it_refuses_impossible_speeds, a_person_comes_first,
-    it_stands_while_it_is_stopped, its_odometry_is_steady_and_agrees_with_itself,
-)  # fmt: skip
+    it_obeys_and_stops_in_silence,
+    it_stops_at_once_on_command,
+    it_refuses_impossible_speeds,
+    a_person_comes_first,
+    it_stands_while_it_is_stopped,
+    its_odometry_is_steady_and_agrees_with_itself,
+)
 
 
 def name(promise: Any) -> str:
@@ -222,12 +258,17 @@ def main(argv: list[str] | None = None) -> int:
     """Test a running robot for all promises; returns 0 if it keeps them."""
     parser = flags.Parser(
         prog="python -m holozen.testing.conformance",
-        description="Test a base for its promises. The robot MOVES: clear a few metres, and keep a hand on its switch.",
+        description="Test a base for its promises. The robot MOVES: clear a few metres, and keep "
+        "a hand on its switch.",
         epilog="example: python -m holozen.testing.conformance Fred --speed 0.05",
     )
     parser.add_argument("robot", nargs="?", default="", type=flags.robot, help="the robot's name")
     parser.add_argument(
-        "--speed", type=flags.number(0.01, 1.0, "m/s"), default=SPEED, metavar="M/S", help="default: %(default)g"
+        "--speed",
+        type=flags.number(0.01, 1.0, "m/s"),
+        default=SPEED,
+        metavar="M/S",
+        help="default: %(default)g",
     )
     connection.add_arguments(parser)
     args: argparse.Namespace = parser.parse_args(argv)
@@ -240,7 +281,10 @@ def main(argv: list[str] | None = None) -> int:
     try:
         probe = Probe(connect, args.robot, args.speed)
         if not probe.watch(PATIENCE / 2):
-            report(f"conformance: no odom of {args.robot or 'the robot at the root'} at {where.where}; start its base")
+            report(
+                f"conformance: no odom of {args.robot or 'the robot at the root'} at "
+                f"{where.where}; start its base"
+            )
             return 1
         for promise in PROMISES:
             try:

@@ -1,7 +1,8 @@
-"""The server of Forked: it has imported what the verbs need, and a process that is forked from it starts at once.
+"""The server of Forked: it has imported what the verbs need, and a process that is forked from it
+starts at once.
 
-`python -m holozen.testing.fork_server FD` gets its requests from the socket FD. It ends when the other end is closed,
-and all that it has forked ends with it.
+`python -m holozen.testing.fork_server FD` gets its requests from the socket FD. It ends when the
+other end is closed, and all that it has forked ends with it.
 """
 
 import fcntl
@@ -19,17 +20,28 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
-from holozen import cli
+from holozen import cli, engines
+from holozen.console import Failure
 from holozen.process import dies_with_parent
 
-LIBRARIES = ("zenoh", "numpy", "pybullet", "xacro", "prompt_toolkit", "holozen.bus")
-SIM = ("cameras", "entities", "loop", "spawn", "io.entity_services", "io.simulation_services", "physics.world")
+LIBRARIES = ("zenoh", "numpy", "xacro", "prompt_toolkit", "holozen.bus")
+SIM = (
+    "cameras",
+    "entities",
+    "loop",
+    "spawn",
+    "io.entity_services",
+    "io.simulation_services",
+    "physics.world",
+)
 """What verbs import once they run, and the modules of the sim that it does."""
 MAX_REQUEST = 200_000  # bytes
 
 
 def _serve(requests: socket.socket) -> tuple[dict[str, Any], list[int]] | None:
-    """Fork for each request. Returns None once there will be no more, and in a new process its request and files."""
+    """Fork for each request. Returns None once there will be no more, and in a new process its
+    request and files.
+    """
     with selectors.DefaultSelector() as selector:
         selector.register(requests, selectors.EVENT_READ)
         while True:
@@ -44,7 +56,8 @@ def _serve(requests: socket.socket) -> tuple[dict[str, Any], list[int]] | None:
                     return None
                 *standard, status = files
                 if (pid := os.fork()) == 0:
-                    for other in list(selector.get_map().values()):  # each keeps the socket of a test open
+                    # each keeps the socket of a test open
+                    for other in list(selector.get_map().values()):
                         if other.data:
                             os.close(other.data[1])
                             os.close(other.fd)
@@ -83,7 +96,9 @@ def _become(request: dict[str, Any], files: Sequence[int]) -> None:
         file: Any = open(number, mode, 0 if unbuffered and number else -1, closefd=False)  # noqa: SIM115
         getattr(file, "raw", file).name = old.name
         lines = not unbuffered and (number == 2 or file.isatty())
-        stream = io.TextIOWrapper(file, old.encoding, old.errors, line_buffering=lines, write_through=unbuffered)
+        stream = io.TextIOWrapper(
+            file, old.encoding, old.errors, line_buffering=lines, write_through=unbuffered
+        )
         setattr(sys, name, stream)
         setattr(sys, f"__{name}__", stream)
     sys.argv[1:] = request["words"]
@@ -91,14 +106,16 @@ def _become(request: dict[str, Any], files: Sequence[int]) -> None:
 
 def main() -> None:
     for verb in cli.VERBS:
-        cli.command(verb)
-    for library in LIBRARIES:
+        with suppress(Failure):  # an extension is left out
+            cli.command(verb)
+    for library in (*LIBRARIES, engines.choose().engine):
         importlib.import_module(library)
     services = cli.command("teleop").__package__.rpartition(".")[0]
     for module in SIM:
         importlib.import_module(f"{services}.sim.{module}")
     gc.collect()
-    gc.freeze()  # else a collection in a forked process would write to, and so copy, all of this memory
+    # else a collection in a forked process would write to, and so copy, all of this memory
+    gc.freeze()
     dies = dies_with_parent()
     with socket.socket(fileno=int(sys.argv[1])) as requests:
         forked = _serve(requests)

@@ -13,17 +13,18 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-HELD_UP = ("late", "old", "unknown clock", "gone")  # the refusals of commands that were held up on their way
+# the refusals of commands that were held up, or whose echo was
+HELD_UP = ("late", "old", "no echo", "void", "gone")
 PATIENCE = 60.0  # s for steps, or for a sim to start
 
 
 class LockStep:
-    """A paused sim on a test's wire, and one of its robots, by name. Flags are those of `holozen sim`, options those of
-    Process.
+    """A paused sim on a test's wire, and one of its robots, by name. Flags are those of `holozen
+    sim`, options those of Process.
 
-    A step is one of the world, 1/240 s by default. The effect of a command over a number of steps is the same, to the
-    last bit, on a slow computer and on a fast one. Other processes may take part, and read and command as always.
-    `odom` and `status` are the newest messages.
+    A step is one of the world, 1/240 s by default. The effect of a command over a number of steps
+    is the same, to the last bit, on a slow computer and on a fast one. Other processes may take
+    part, and read and command as always. `odom` and `status` are the newest messages.
     """
 
     def __init__(self, wire: Wire, *flags: str, robot: str = "", **options: Any) -> None:
@@ -49,10 +50,14 @@ class LockStep:
 
         before = self.status
         self._call("step_simulation", si.StepSimulationRequest(steps), si.StepSimulationReply)
-        return self._read(lambda now: (now.epoch, now.steps) == (before.epoch, before.steps + steps))
+        return self._read(
+            lambda now: (now.epoch, now.steps) == (before.epoch, before.steps + steps)
+        )
 
     def reset(self, scope: int = 0) -> "Odometry":
-        """Reset the sim, or what a `scope` of ResetSimulationRequest names; returns the first odom after it."""
+        """Reset the sim, or what a `scope` of ResetSimulationRequest names; returns the first odom
+        after it.
+        """
         from holozen.messages import simulation_interfaces as si
 
         before = self.status
@@ -60,12 +65,17 @@ class LockStep:
         return self._read(lambda now: now.epoch == before.epoch + 1)
 
     def drive(self, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> None:
-        """Send a command (m/s and rad/s in the body frame), and wait until the robot has it; it obeys from the next
-        step on. AssertionError if it is refused.
+        """Send a command (m/s and rad/s in the body frame), and wait until the robot has it; it
+        obeys from the next step on. AssertionError if it is refused.
         """
         from holozen.messages import Twist
 
-        self._wait(lambda: self._commands.matched, "a robot that listens")
+        echoes = self._commands.echoes
+        assert echoes
+        self._wait(
+            lambda: self._commands.matched and echoes.may_command(),
+            "a robot that listens and beats",
+        )
         refusal = HELD_UP[0]
         while refusal.startswith(HELD_UP):
             self._obeyed = _newest(self._statuses) or self._obeyed  # others may have commanded
@@ -83,7 +93,9 @@ class LockStep:
 
         def look() -> T:
             if self.process.returncode is not None:
-                raise AssertionError(f"{self.process}; it wrote:\n{self.process.out}{self.process.err}")
+                raise AssertionError(
+                    f"{self.process}; it wrote:\n{self.process.out}{self.process.err}"
+                )
             return condition()
 
         return wait_for(look, PATIENCE, what)
@@ -94,7 +106,9 @@ class LockStep:
         self.bus.call(key, request, reply, PATIENCE)
 
     def _is_read(self, before: int) -> bool:
-        """Whether the newest command status counts other than `before` commands: more, or those of a new robot."""
+        """Whether the newest command status counts other than `before` commands: more, or those of
+        a new robot.
+        """
         self._obeyed = _newest(self._statuses) or self._obeyed
         return _count(self._obeyed) != before
 
@@ -124,5 +138,7 @@ def _count(status: "CommandStatus") -> int:
 
 def _newest(subscription: "Subscription[Any]") -> Any:
     """The newest message that waits, or None."""
-    messages = [received.message for received in iter(subscription.try_recv, None) if received.message]
+    messages = [
+        received.message for received in iter(subscription.try_recv, None) if received.message
+    ]
     return messages[-1] if messages else None

@@ -21,22 +21,35 @@ from holozen.process import dies_with_parent
 
 T = TypeVar("T")
 
-SOON, EVERY = 0.0005, 0.005  # s between two polls, at first and later: a condition that is met soon is seen at once
+# s between two polls, at first and later: a condition that is met soon is seen at once
+SOON, EVERY = (0.0005, 0.005)
 GRACE = 3.0  # s from SIGTERM to SIGKILL
 START = [sys.executable, "-m", "holozen"]
 """The words that start holozen in a new Python; a verb follows."""
 FIXED = ("PYTHON", "LANG", "LC_", "LD_", "MALLOC_", "OPENBLAS_")
 """How the names of those variables begin that count only when a program starts."""
 PARENTS = ("up", "launch")
-"""Verbs that are not forked: all that they start is in a new Python, and `ps` shows their own words."""
-ENTER = "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); os.execvp(sys.argv[1], sys.argv[1:])"
-"""A program that makes its standard input its controlling terminal, then runs the words that follow."""
+"""Verbs that are not forked: all that they start is in a new Python, and `ps` shows their own
+words.
+"""
+ENTER = (
+    "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
+    "os.execvp(sys.argv[1], sys.argv[1:])"
+)
+"""A program that makes its standard input its controlling terminal, then runs the words that
+follow.
+"""
 SETPRIV = shutil.which("setpriv")  # of util-linux; sets the signal, then becomes the program
 PATIENCE = 30.0  # s; long, since a loaded machine is slow, and only failures wait for all of it
 
 
-def wait_for(condition: Callable[[], T], within: float = PATIENCE, what: str | Callable[[], str] = "a condition") -> T:
-    """Wait until `condition()` is true, and return its value. AssertionError after `within` seconds.
+def wait_for(
+    condition: Callable[[], T],
+    within: float = PATIENCE,
+    what: str | Callable[[], str] = "a condition",
+) -> T:
+    """Wait until `condition()` is true, and return its value. AssertionError after `within`
+    seconds.
 
     `what` describes the condition in the error; a function is called only then.
     """
@@ -44,7 +57,9 @@ def wait_for(condition: Callable[[], T], within: float = PATIENCE, what: str | C
     while not (value := condition()):
         if time.monotonic() > deadline:
             words = what if isinstance(what, str) else what()
-            raise AssertionError(f"waited {within:g} s in vain for {words}; the last look gave {value!r}")
+            raise AssertionError(
+                f"waited {within:g} s in vain for {words}; the last look gave {value!r}"
+            )
         time.sleep(pause)
         pause = min(1.5 * pause, EVERY)
     return value
@@ -54,14 +69,20 @@ class Forked:
     """A verb of holozen, forked by a server that has imported it."""
 
     def __init__(
-        self, words: Sequence[str], env: dict[str, str], files: Sequence[int | IO[bytes]], terminal: bool
+        self,
+        words: Sequence[str],
+        env: dict[str, str],
+        files: Sequence[int | IO[bytes]],
+        terminal: bool,
     ) -> None:
         words, folder = words[len(START) :], os.getcwd()
         request = json.dumps({"words": words, "env": env, "folder": folder, "terminal": terminal})
         end, theirs = socket.socketpair()
         with end, theirs, open(os.devnull, "r+b", buffering=0) as null:
             standard = [null if file == subprocess.DEVNULL else file for file in files]
-            given = [file if isinstance(file, int) else file.fileno() for file in (*standard, theirs)]
+            given = [
+                file if isinstance(file, int) else file.fileno() for file in (*standard, theirs)
+            ]
             socket.send_fds(_server()[0], [request.encode()], given)
             theirs.close()
             pid, descriptors, _, _ = socket.recv_fds(end, 16, 1)
@@ -80,7 +101,8 @@ class Forked:
         with self._lock:
             if self.returncode is None and select.select([self._descriptors[1]], [], [], 0)[0]:
                 status = os.read(self._descriptors[1], 16)
-                self.returncode = int(status or -signal.SIGTERM)  # without a status, the server has ended
+                # without a status, the server has ended
+                self.returncode = int(status or -signal.SIGTERM)
             return self.returncode
 
     def wait(self, timeout: float) -> int:
@@ -98,11 +120,13 @@ class Forked:
 
 
 class Process:
-    """A running program, the leader of its own session. `out` and `err` are its output so far. It gets a SIGTERM when
-    the thread that started it ends, or if it is forked the test's process, so that a killed test leaves nothing behind.
+    """A running program, the leader of its own session. `out` and `err` are its output so far. It
+    gets a SIGTERM when the thread that started it ends, or if it is forked the test's process, so
+    that a killed test leaves nothing behind.
 
-    `stdin`, `stdout` and `stderr` are as for subprocess.Popen; by default the first is empty, the others are captured.
-    With `terminal`, the first is a terminal, which becomes its controlling one: it delivers hang-ups and interrupts.
+    `stdin`, `stdout` and `stderr` are as for subprocess.Popen; by default the first is empty, the
+    others are captured. With `terminal`, the first is a terminal, which becomes its controlling
+    one: it delivers hang-ups and interrupts.
 
     A verb of holozen is forked from a process that has imported it already, unless `is_new`.
     """
@@ -124,7 +148,11 @@ class Process:
         self._ended: tuple[str, str] | None = None
         self._popen = self._start(
             {**os.environ, **(env or {})},
-            (stdin, self._out if stdout is None else stdout, self._err if stderr is None else stderr),
+            (
+                stdin,
+                self._out if stdout is None else stdout,
+                self._err if stderr is None else stderr,
+            ),
             terminal,
             is_new,
         )
@@ -136,7 +164,9 @@ class Process:
         if not is_new and _can_fork(self.words, env):
             return Forked(self.words, env, files, terminal)
         # A preexec_fn needs a fork, which takes 50 ms in a test process of 900 MB.
-        wrapper = [SETPRIV, "--pdeathsig", "TERM"] if SETPRIV and shutil.which(self.words[0]) else []
+        wrapper = (
+            [SETPRIV, "--pdeathsig", "TERM"] if SETPRIV and shutil.which(self.words[0]) else []
+        )
         if terminal:
             wrapper += [sys.executable, "-S", "-c", ENTER]
         stdin, stdout, stderr = files
@@ -157,7 +187,10 @@ class Process:
         self.close()
 
     def __repr__(self) -> str:
-        return f"<{' '.join(self.words)}: {'runs' if self.returncode is None else f'exit code {self.returncode}'}>"
+        return (
+            f"<{' '.join(self.words)}: "
+            f"{'runs' if self.returncode is None else f'exit code {self.returncode}'}>"
+        )
 
     @property
     def out(self) -> str:
@@ -175,23 +208,36 @@ class Process:
         return self._popen.poll()
 
     def wait_for_line(self, text: str, within: float = PATIENCE) -> str:
-        """The first line of its output or errors that contains `text`. AssertionError if it ends without one."""
+        """The first line of its output or errors that contains `text`. AssertionError if it ends
+        without one.
+        """
 
         def look() -> str | None:
             ended = self.returncode is not None
-            found = next((line for line in f"{self.out}\n{self.err}".splitlines() if text in line), None)
+            found = next(
+                (line for line in f"{self.out}\n{self.err}".splitlines() if text in line), None
+            )
             if ended and found is None:
-                raise AssertionError(f"{self} ended without {text!r}; it wrote:\n{self.out}{self.err}")
+                raise AssertionError(
+                    f"{self} ended without {text!r}; it wrote:\n{self.out}{self.err}"
+                )
             return found
 
-        return wait_for(look, within, lambda: f"{text!r} from {self}, which wrote:\n{self.out}{self.err}") or ""
+        return (
+            wait_for(
+                look, within, lambda: f"{text!r} from {self}, which wrote:\n{self.out}{self.err}"
+            )
+            or ""
+        )
 
     def wait(self, within: float = PATIENCE) -> int:
         """Wait for its end and return the exit code. AssertionError if it keeps running."""
         try:
             return self._popen.wait(within)
         except subprocess.TimeoutExpired:
-            raise AssertionError(f"{self} still runs after {within:g} s; it wrote:\n{self.out}{self.err}") from None
+            raise AssertionError(
+                f"{self} still runs after {within:g} s; it wrote:\n{self.out}{self.err}"
+            ) from None
 
     def signal(self, number: int) -> None:
         """Send it a signal."""
@@ -225,8 +271,12 @@ class Process:
         self._err.close()
 
 
-def run(words: Sequence[str], within: float = PATIENCE, **options: Any) -> subprocess.CompletedProcess[str]:
-    """Run a program to its end. Options are those of Process. AssertionError if it keeps running."""
+def run(
+    words: Sequence[str], within: float = PATIENCE, **options: Any
+) -> subprocess.CompletedProcess[str]:
+    """Run a program to its end. Options are those of Process. AssertionError if it keeps
+    running.
+    """
     with Process(words, **options) as process:
         code = process.wait(within)
     return subprocess.CompletedProcess(words, code, process.out, process.err)
@@ -259,7 +309,8 @@ def _server() -> tuple[socket.socket, dict[str, str]]:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             pass_fds=[theirs.fileno()],
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # a process with threads cannot be forked
+            # a process with threads cannot be forked
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
             start_new_session=True,
         )
 

@@ -12,11 +12,14 @@ from typing import Any, Self
 from holozen.testing.process import PATIENCE, Process, wait_for
 
 SIZE = 100, 32  # columns and rows
-LAST = 1.0  # s to wait for the last output of a process that has ended, while another one keeps its terminal open
+# s to wait for the last output of a process that has ended, while another one keeps its terminal
+# open
+LAST = 1.0
 
 
 class Terminal:
-    """A process and the terminal it runs in. Its output is read continuously, as by a real terminal.
+    """A process and the terminal it runs in. Its output is read continuously, as by a real
+    terminal.
 
     `size` is in columns and rows; `is_new` is as for Process. Only `screen` needs the package pyte.
     """
@@ -37,7 +40,11 @@ class Terminal:
         self._shown = 0  # bytes passed to the emulator
         self._emulator: Any = None
         self._screen: str | None = None  # what the emulator shows now, once it was asked
-        self._closing, self._frozen, self._reading = threading.Event(), threading.Event(), threading.Lock()
+        self._closing, self._frozen, self._reading = (
+            threading.Event(),
+            threading.Event(),
+            threading.Lock(),
+        )
         self._read_all = threading.Event()  # set once nothing more can come
         try:
             self.process = Process(
@@ -62,11 +69,16 @@ class Terminal:
         self.close()
 
     def type(self, keys: str | bytes) -> None:
-        """Press keys: `terminal.type("i")`; control and arrow keys by their bytes, such as `"\\x1b[A"`."""
+        """Press keys: `terminal.type("i")`; control and arrow keys by their bytes, such as
+        `"\\x1b[A"`.
+        """
         os.write(self._master, keys.encode() if isinstance(keys, str) else keys)
 
-    def hold(self, key: str | bytes, seconds: float, delay: float = 0.5, interval: float = 0.04) -> list[float]:
-        """Hold a key for `seconds`, in a terminal that repeats it after `delay` and then every `interval` seconds.
+    def hold(
+        self, key: str | bytes, seconds: float, delay: float = 0.5, interval: float = 0.04
+    ) -> list[float]:
+        """Hold a key for `seconds`, in a terminal that repeats it after `delay` and then every
+        `interval` seconds.
 
         Returns the times at which it was sent, as of time.monotonic.
         """
@@ -83,8 +95,8 @@ class Terminal:
     def hold_until(self, key: str | bytes, condition: Callable[[], object]) -> None:
         """Hold a key until `condition()` is true; AssertionError after 30 s.
 
-        After each 3 s it is let go for a second: a program that was held up, as on a busy machine, may disregard a key
-        that was held meanwhile.
+        After each 3 s it is let go for a second: a program that was held up, as on a busy machine,
+        may disregard a key that was held meanwhile.
         """
 
         def is_met() -> bool:
@@ -119,7 +131,9 @@ class Terminal:
         self._frozen.clear()
 
     def received(self, data: bytes) -> None:
-        """Called with the output of the process. Does nothing; override it in a terminal that answers queries."""
+        """Called with the output of the process. Does nothing; override it in a terminal that
+        answers queries.
+        """
 
     @property
     def closed(self) -> bool:
@@ -150,23 +164,31 @@ class Terminal:
         return self._screen
 
     def wait_for_text(self, text: str, within: float = PATIENCE) -> str:
-        """Wait until the screen shows `text`, and return the screen. AssertionError if the process ends without it."""
+        """Wait until the screen shows `text`, and return the screen. AssertionError if the process
+        ends without it.
+        """
 
         def look() -> str | None:
             ended = self.process.returncode is not None
             screen = self.screen()
             if ended and text not in screen:
-                raise AssertionError(f"{self.process} ended without {text!r} on its screen:\n{screen}")
+                raise AssertionError(
+                    f"{self.process} ended without {text!r} on its screen:\n{screen}"
+                )
             return screen if text in screen else None
 
         return wait_for(look, within, lambda: f"{text!r} on the screen:\n{self.screen()}") or ""
 
     def modes(self) -> list[Any]:
-        """The terminal's modes (termios), such as echo and line editing; compare with `modes_before`."""
+        """The terminal's modes (termios), such as echo and line editing; compare with
+        `modes_before`.
+        """
         return termios.tcgetattr(self._master)
 
     def hang_up(self) -> None:
-        """Close the terminal, like closing its window: the process receives SIGHUP and has no screen left."""
+        """Close the terminal, like closing its window: the process receives SIGHUP and has no
+        screen left.
+        """
         if not self._closing.is_set():
             self._closing.set()
             self._reader.join()
@@ -180,7 +202,11 @@ class Terminal:
 
     def _catch_up(self) -> None:
         """Once the process has ended, wait until all that it wrote has been read."""
-        if self.process.returncode is None or self._frozen.is_set() or threading.current_thread() is self._reader:
+        if (
+            self.process.returncode is None
+            or self._frozen.is_set()
+            or threading.current_thread() is self._reader
+        ):
             return
         if not self._read_all.wait(LAST):
             self._read_all.set()  # do not wait again
@@ -188,7 +214,10 @@ class Terminal:
     def _read(self) -> None:
         while not self._closing.is_set():
             with self._reading:
-                if not (frozen := self._frozen.is_set()) and select.select([self._master], [], [], 0.02)[0]:
+                if (
+                    not (frozen := self._frozen.is_set())
+                    and select.select([self._master], [], [], 0.02)[0]
+                ):
                     try:
                         data = os.read(self._master, 65536)
                     except OSError:  # the last process has left the terminal

@@ -7,6 +7,7 @@ import subprocess
 from collections import deque
 from typing import TYPE_CHECKING, Any, Self
 
+from holozen.system import IS_LINUX
 from holozen.testing.process import START, Process, run
 from holozen.testing.terminal import Terminal
 from holozen.transport.connection import Connection
@@ -15,17 +16,26 @@ if TYPE_CHECKING:
     from holozen.bus import Bus
 
 
+STAMPED = ("timestamping/enabled", "true")
+
+
 class Wire:
     """A loopback port on which only the processes and buses of one test meet.
 
-    `connection` is for `holozen.bus.Bus`, `flags` for any holozen verb, `endpoint` for any Zenoh tool.
+    `connection` is for `holozen.bus.Bus`, `flags` for any holozen verb, `endpoint` for any Zenoh
+    tool; `processes` and `terminals` are those that were started here. All samples have Zenoh's
+    timestamp, of when they were sent.
     """
 
     def __init__(self) -> None:
         self.port = free_port()
         self.endpoint = f"tcp/127.0.0.1:{self.port}"
-        self.connection = Connection(connect=(self.endpoint,), listen=(self.endpoint,))
+        self.connection = Connection(
+            connect=(self.endpoint,), listen=(self.endpoint,), cfg=(STAMPED,)
+        )
         self.flags = self.connection.arguments()
+        self.processes: list[Process] = []
+        self.terminals: list[Terminal] = []
         self._ends = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
@@ -37,18 +47,28 @@ class Wire:
     def start(self, verb: str, *words: str, **options: Any) -> Process:
         """Start `holozen VERB WORDS...` here. Options are those of Process."""
         process = self._ends.enter_context(Process(command(verb, *words, *self.flags), **options))
-        self._ends.callback(lambda: print(f"--- {process}\n{process.out}{process.err}"))  # pytest shows it on failure
+        self.processes.append(process)
+        # pytest shows it on failure
+        self._ends.callback(lambda: print(f"--- {process}\n{process.out}{process.err}"))
         return process
 
     def terminal(self, verb: str, *words: str, **options: Any) -> Terminal:
-        """Start `holozen VERB WORDS...` here, in a pseudo-terminal. Options are those of Terminal."""
-        return self._ends.enter_context(Terminal(command(verb, *words, *self.flags), **options))
+        """Start `holozen VERB WORDS...` here, in a pseudo-terminal. Options are those of
+        Terminal.
+        """
+        terminal = self._ends.enter_context(Terminal(command(verb, *words, *self.flags), **options))
+        self.terminals.append(terminal)
+        return terminal
 
-    def run(self, verb: str, *words: str, given: str = "", within: float = 30.0) -> subprocess.CompletedProcess[str]:
+    def run(
+        self, verb: str, *words: str, given: str = "", within: float = 30.0
+    ) -> subprocess.CompletedProcess[str]:
         """Run `holozen VERB WORDS...` here to its end, with `given` as its standard input."""
         all_words = command(verb, *words, *self.flags)
         if given:
-            return subprocess.run(all_words, input=given, capture_output=True, text=True, timeout=within)
+            return subprocess.run(
+                all_words, input=given, capture_output=True, text=True, timeout=within
+            )
         return run(all_words, within)
 
     def bus(self, node: str = "test", **options: Any) -> "Bus":
@@ -74,13 +94,15 @@ _marks = deque[socket.socket]()
 def free_port() -> int:
     """A free TCP port on loopback, below the range of ephemeral ports.
 
-    A Unix socket of that number marks it, so that no other test process is given it too before it is listened on.
+    A Unix socket of that number marks it, so that no other test process is given it too before it
+    is listened on.
     """
     while True:
         port = random.SystemRandom().randint(10_000, 32_000)  # Hypothesis seeds the other generator
         mark = socket.socket(socket.AF_UNIX)
         with socket.socket() as probe, contextlib.suppress(OSError):
-            mark.bind(f"\0holozen-test-{port}")  # abstract: there is no file of it
+            if IS_LINUX:
+                mark.bind(f"\0holozen-test-{port}")  # abstract: there is no file of it
             probe.bind(("127.0.0.1", port))
             _marks.append(mark)
             if len(_marks) > KEPT:

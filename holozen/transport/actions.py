@@ -1,8 +1,10 @@
-"""Actions, as ROS 2 has them: goals that take time, on three services and two topics below the action's key.
+"""Actions, as ROS 2 has them: goals that take time, on three services and two topics below the
+action's key.
 
-The client makes the goal's id and sends it with the goal (`send_goal`); the server accepts or rejects it, publishes
-progress (`feedback`) and the states of all its goals (`status`), and answers a request for the result (`get_result`)
-when the goal has ended. Until then anyone may ask it to cancel (`cancel_goal`).
+The client makes the goal's id and sends it with the goal (`send_goal`); the server accepts or
+rejects it, publishes progress (`feedback`) and the states of all its goals (`status`), and answers
+a request for the result (`get_result`) when the goal has ended. Until then anyone may ask it to
+cancel (`cancel_goal`).
 Source: ROS 2's design, "Actions"; codes and transitions are those of action_msgs and rcl_action.
 """
 
@@ -26,12 +28,18 @@ if TYPE_CHECKING:
     from holozen.transport.node import Node
 
 BELOW = "/_action/"  # between an action's key and a part of it
-SEND, CANCEL, RESULT, FEEDBACK, STATUS = "send_goal", "cancel_goal", "get_result", "feedback", "status"
+SEND, CANCEL, RESULT, FEEDBACK, STATUS = (
+    "send_goal",
+    "cancel_goal",
+    "get_result",
+    "feedback",
+    "status",
+)
 
 KEPT = 10.0  # s that the result of a goal is kept after its end, as in ROS 2
 MAX_GOALS = 256  # goals of a server, ended ones included
 MAX_WAITING = 100  # requests for the result of one goal
-LONGEST = 86_400.0  # s of one request for a result
+MAX_RESULT_WAIT = 86_400.0  # s of one request for a result
 GONE = 1.0  # s without a server after which the goal is lost
 POLL = 0.02  # s between two checks for it
 NO_ID = bytes(16)
@@ -82,7 +90,9 @@ def new_id() -> bytes:
 
 
 class Goal:
-    """A goal of a server. `stamp` is when it was accepted, in ns; `result` the reply to requests for its result."""
+    """A goal of a server. `stamp` is when it was accepted, in ns; `result` the reply to requests
+    for its result.
+    """
 
     def __init__(self, identity: bytes, stamp: int, request: Any) -> None:
         self.id, self.stamp, self.request = identity, stamp, request
@@ -98,8 +108,8 @@ class Goal:
 
 
 class Goals:
-    """The goals of one action server with their states, and the two topics. `action` names its messages, as
-    holozen.messages.action.Action does. All methods may be called from any thread.
+    """The goals of one action server with their states, and the two topics. `action` names its
+    messages, as holozen.messages.action.Action does. All methods may be called from any thread.
     """
 
     def __init__(self, bus: Bus, key: str, action: Any, kept: float = KEPT) -> None:
@@ -108,7 +118,11 @@ class Goals:
         self._messages, self._action, self._kept = action_msgs, action, kept
         self.lock = threading.RLock()
         self._all: dict[bytes, Goal] = {}
-        for kind in (action.Goal, action.Impl.SendGoalService.Response, action.Impl.GetResultService.Response):
+        for kind in (
+            action.Goal,
+            action.Impl.SendGoalService.Response,
+            action.Impl.GetResultService.Response,
+        ):
             bus.define(kind)  # the publisher does so for the feedback
         self._feedback = bus.publisher(key_of(key, FEEDBACK), action.Impl.FeedbackMessage)
         self._status = bus.publisher(key_of(key, STATUS), action_msgs.GoalStatusArray)
@@ -137,7 +151,9 @@ class Goals:
         return goal
 
     def move(self, goal: Goal, state: State) -> None:
-        """Change the state of a goal. Raises ValueError if that does not follow from its present one."""
+        """Change the state of a goal. Raises ValueError if that does not follow from its present
+        one.
+        """
         with self.lock:
             if state not in _NEXT.get(goal.state, ()):
                 raise ValueError(f"a goal that is {goal.state.name} cannot become {state.name}")
@@ -155,19 +171,27 @@ class Goals:
                 self._feedback.put(message)
 
     def to_cancel(self, identity: bytes, stamp: int) -> tuple[Cancel, list[Goal]]:
-        """The goals that a request to cancel selects, and the answer if there are none. An id selects that goal, a
-        stamp those accepted until then, neither selects all.
+        """The goals that a request to cancel selects, and the answer if there are none. An id
+        selects that goal, a stamp those accepted until then, neither selects all.
         """
         with self.lock:
             one = self.get(identity)
             if identity != NO_ID and not stamp and (one is None or not one.is_active):
                 return (Cancel.GOAL_TERMINATED if one else Cancel.UNKNOWN_GOAL_ID), []
             every = identity == NO_ID and not stamp
-            found = [goal for goal in self._all.values() if every or goal is one or 0 < goal.stamp <= stamp]
-            return Cancel.NONE, [goal for goal in found if goal.state in (State.ACCEPTED, State.EXECUTING)]
+            found = [
+                goal
+                for goal in self._all.values()
+                if every or goal is one or 0 < goal.stamp <= stamp
+            ]
+            return Cancel.NONE, [
+                goal for goal in found if goal.state in (State.ACCEPTED, State.EXECUTING)
+            ]
 
     def cancel(self, request: Any, reply: Any, allows: Callable[[Goal], bool]) -> Any:
-        """Fill in the reply to a request to cancel, and begin to cancel those goals for which `allows` is true."""
+        """Fill in the reply to a request to cancel, and begin to cancel those goals for which
+        `allows` is true.
+        """
         info = request.goal_info
         code, goals = self.to_cancel(bytes(info.goal_id.uuid), nanoseconds(info.stamp))
         canceled = [goal for goal in goals if self._canceled(goal, allows)]
@@ -196,7 +220,9 @@ class Goals:
 
     def _forget(self) -> None:
         now = time.monotonic()
-        for goal in [one for one in self._all.values() if not one.is_active and now - one.ended > self._kept]:
+        for goal in [
+            one for one in self._all.values() if not one.is_active and now - one.ended > self._kept
+        ]:
             del self._all[goal.id]
 
     def _info(self, goal: Goal, kind: Any) -> Any:
@@ -208,7 +234,10 @@ class Goals:
     def _publish(self) -> None:
         self._forget()
         m = self._messages
-        states = [m.GoalStatus(self._info(goal, m.GoalInfo), int(goal.state)) for goal in self._all.values()]
+        states = [
+            m.GoalStatus(self._info(goal, m.GoalInfo), int(goal.state))
+            for goal in self._all.values()
+        ]
         self._status.put(m.GoalStatusArray(states))
 
 
@@ -218,12 +247,14 @@ def nanoseconds(stamp: Any) -> int:
 
 
 class ActionServer(Goals):
-    """Serves an action of Structs: from its own threads after `start`, or else whenever `answer` is called.
+    """Serves an action of Structs: from its own threads after `start`, or else whenever `answer` is
+    called.
 
-    `refuses` returns why a goal is rejected, or "". Our clients receive the reason, those of ROS only the rejection.
-    `begin` is called with this server and each accepted goal, and has to end the goal by `finish`. A goal that is to be
-    cancelled is CANCELING until then. A goal that was sent more than `max_age` seconds ago is rejected, and so is one
-    whose client no longer waits for the answer.
+    `refuses` returns why a goal is rejected, or "". Our clients receive the reason, those of ROS
+    only the rejection. `begin` is called with this server and each accepted goal, and has to end
+    the goal by `finish`. A goal that is to be cancelled is CANCELING until then. A goal that was
+    sent more than `max_age` seconds ago is rejected, and so is one whose client no longer waits for
+    the answer.
     """
 
     def __init__(
@@ -242,10 +273,16 @@ class ActionServer(Goals):
         send, result = action.Impl.SendGoalService, action.Impl.GetResultService
         self._result_type = result.Response
         self._goals = bus.serve(key_of(key, SEND), send.Request, send.Response, self._accept)
-        cancels = bus.serve(key_of(key, CANCEL), CancelGoalRequest, CancelGoalReply,
-            lambda request: self.cancel(request, CancelGoalReply(), lambda _: True))  # fmt: skip
+        cancels = bus.serve(
+            key_of(key, CANCEL),
+            CancelGoalRequest,
+            CancelGoalReply,
+            lambda request: self.cancel(request, CancelGoalReply(), lambda _: True),
+        )
         self._servers = [self._goals, cancels]
-        self._results = bus.serve(key_of(key, RESULT), result.Request, result.Response, _answered_later)
+        self._results = bus.serve(
+            key_of(key, RESULT), result.Request, result.Response, _answered_later
+        )
         self._accepted = send.Response
 
     @property
@@ -283,13 +320,8 @@ class ActionServer(Goals):
         reply = self._accepted()
         if reason := self.refusal(identity) or self._refuses(request.goal):
             return reply, reason
-        now = time.monotonic()
-        try:
-            self._goals.require_sent_after(now - self._max_age, now, OLD.format(limit=self._max_age))
-        except ServiceError as error:
-            if "outdated" in error.fields:
-                return reply, str(error)
-            raise
+        if (age := self._goals.age()) is not None and age > self._max_age:
+            return reply, OLD.format(limit=self._max_age)
         now = time.time_ns()
         goal = self.accept(identity, now, request.goal)
         reply.accepted = True
@@ -319,7 +351,9 @@ class ActionServer(Goals):
                 if len(goal.waiting) < MAX_WAITING:
                     return goal.waiting.append(query)
                 with query:
-                    return refuse(query, f"{MAX_WAITING} requests wait for the result of this goal already")
+                    return refuse(
+                        query, f"{MAX_WAITING} requests wait for the result of this goal already"
+                    )
         return self._reply(query, goal.result if goal else self._result_type())
 
     def _reply(self, query: Any, reply: Any) -> None:
@@ -334,7 +368,8 @@ def _answered_later(_request: Any) -> Any:
 def wait_for_result(
     node: Node, action: str, payload: bytes, encoding: str, closed: Callable[[], bool]
 ) -> Sample | None:
-    """Ask for the result of a goal, and wait until the goal has ended; None if `closed` became true before.
+    """Ask for the result of a goal, and wait until the goal has ended; None if `closed` became true
+    before.
 
     Raises ServiceError with the server's reason, or once there has been no server for a second.
     """
@@ -342,7 +377,7 @@ def wait_for_result(
     is_served, seen = node.served(key), time.monotonic()
     while not closed():
         began = time.monotonic()
-        for answer in node.ask(key, LONGEST, payload=payload, encoding=encoding):
+        for answer in node.ask(key, MAX_RESULT_WAIT, payload=payload, encoding=encoding):
             if isinstance(answer, Sample):
                 return answer
             if answer != TIMEOUT:
@@ -366,8 +401,8 @@ class Found(NamedTuple):
 
 
 def found_in(ends: Iterable[Endpoint]) -> list[Found]:
-    """The actions among the endpoints of nodes: a server by its service send_goal, a client by its subscription to the
-    feedback.
+    """The actions among the endpoints of nodes: a server by its service send_goal, a client by its
+    subscription to the feedback.
     """
     marks = {("srv", SEND): "_SendGoal", ("sub", FEEDBACK): "_FeedbackMessage"}
     found = []
@@ -375,5 +410,7 @@ def found_in(ends: Iterable[Endpoint]) -> list[Found]:
         action, below, part = end.key.rpartition(BELOW)
         mark = marks.get((end.kind, part))
         if below and mark and end.type.endswith(mark):
-            found.append(Found(action, end.type.removesuffix(mark), end.node, end.session, end.kind == "srv"))
+            found.append(
+                Found(action, end.type.removesuffix(mark), end.node, end.session, end.kind == "srv")
+            )
     return found

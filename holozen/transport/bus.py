@@ -1,12 +1,11 @@
-"""The bus: a node on the wire, typed. The codec is loaded with the first publisher, subscriber or server."""
+"""The bus: a node on the wire, typed. The codec is loaded with the first publisher, subscriber or
+server.
+"""
 
 from __future__ import annotations
 
-import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cached_property, partial
-from itertools import count
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import zenoh
@@ -14,18 +13,27 @@ import zenoh
 from holozen import wire
 from holozen.suggest import cut, shorten
 from holozen.transport import services
+from holozen.transport.beat import (
+    BEAT,
+    Beat,
+    Echoes,
+    Hearing,
+    OwnTime,
+    beat_key,
+    name_for,
+    tokens_of,
+)
 from holozen.transport.errors import BusError
-from holozen.transport.graph import definition
+from holozen.transport.graph import definition, quoted
 from holozen.transport.node import Node, checked_wire
-from holozen.transport.peer_clocks import PeerClocks, clock_key
 from holozen.transport.pubsub import Gets, Latest, Publisher, RawPublisher, Subscription
-from holozen.transport.samples import PRIORITIES, Answers, Dealer, RawSubscriber, Replies, Ring, stamps
+from holozen.transport.samples import PRIORITIES, Dealer, Numbers, RawSubscriber, Ring, stamps
 from holozen.transport.services import RING, ROOM, Server
-from holozen.transport.session import one_line
+from holozen.transport.session import one_line, tokens
 
 if TYPE_CHECKING:
     from holozen.messages import Message
-    from holozen.transport.members import Verifier
+    from holozen.transport.authenticator import Verifier
 
 M = TypeVar("M", bound="Message")
 P = TypeVar("P", bound=RawPublisher)
@@ -34,16 +42,14 @@ R = TypeVar("R", bound="Message")
 LARGEST_STATE = 1_000_000  # bytes; an odom takes about 1,500
 DEALT = 1 << 14  # samples, or requests, of all keys of a Dealer that wait for it
 LONGEST_CALL = 1e9  # s; Zenoh takes no infinite timeout
-GETS = 256  # waiting queries for a publisher's last value, or for our clock; beyond, the oldest get no reply
+ASKED = 1.0  # s for a receiver to answer with its beat
+HOLDERS = 1024  # tokens of one key that come or go between two commands
+# waiting queries for a publisher's last value, or for our beat; beyond, the oldest get no reply
+GETS = 256
 
 
 class Bus(Node):
     """A node with typed topics and services."""
-
-    @cached_property
-    def clock_asked(self) -> threading.Event:
-        """Set once another node has asked for this session's clock."""
-        return threading.Event()
 
     @cached_property
     def _defined(self) -> set[str]:
@@ -55,39 +61,91 @@ class Bus(Node):
         """What answers gets, by key expression."""
         return {}
 
-    def stamps(self, key: str) -> Callable[[], bytes]:
-        """A function that makes the attachments of our samples on a key."""
-        _ = self.clock_server
-        return stamps(self._signer, self.id, self._numbers.setdefault(key, count()))
+    def stamps(self, key: str) -> Callable[..., bytes]:
+        """A function that makes the attachments of our samples on a key, of a command from its
+        echoes.
+        """
+        return stamps(self._signer, self.id, self._numbers.setdefault(key, Numbers()))
 
     @cached_property
-    def _numbers(self) -> dict[str, Iterator[int]]:
-        """Numbers our samples on each key."""
+    def own_time(self) -> OwnTime:
+        """The time of this session, for the age of what echoes it."""
+        return OwnTime(self.id)
+
+    def beat(self, name: str = BEAT) -> Beat:
+        """The beat of this node, for those who command it: `poll` it at least 20 times a second in
+        the loop that obeys them. Made by the first call. `name`: one of beat.py.
+        """
+        if name not in self._beats:
+            key, quality = beat_key(self.id, name), zenoh.CongestionControl.DROP
+            publisher = self.session.declare_publisher(
+                key, priority=zenoh.Priority.REAL_TIME, express=True, congestion_control=quality
+            )
+            queryable = self.session.declare_queryable(key, zenoh.handlers.RingChannel(GETS))
+            # The token comes last, and before those of what it obeys: who finds those hears it.
+            self._beats[name] = self._keep(
+                Beat(self.own_time, key, publisher, queryable, self.announce(name))
+            )
+        return self._beats[name]
+
+    @cached_property
+    def _beats(self) -> dict[str, Beat]:
+        """Our beats, by name."""
+        return {}
+
+    def echoes(self, key: str) -> Echoes:
+        """What commands on `key` return of the beats of those who obey them. Raises BusError for a
+        wrong key.
+        """
+        with one_line(f"key {key!r}"):
+            zenoh.KeyExpr(key)  # raises ZError; that of the token would name the token
+        if (
+            name := name_for(key)
+        ) not in self._hearings:  # first, so that its tokens are known first
+            beating = tokens_of(name)
+            call = partial(self._roll_call, beating)
+            self._hearings[name] = self._keep(
+                Hearing(name, tokens(self.session, beating), self._hear, call)
+            )
+        holders = tokens(self.session, f"@holozen/*/*/sub/*/*/*/{quoted(key)}", HOLDERS)
+        return self._keep(Echoes(key, self._hearings[name], holders))
+
+    def _hear(self, key: str) -> tuple[Any, Any]:
+        """A subscription to a beat, and the replies to a query for it."""
+        subscriber = self.session.declare_subscriber(key, zenoh.handlers.RingChannel(1))
+        return subscriber, self.session.get(
+            key, timeout=ASKED, priority=zenoh.Priority.REAL_TIME, express=True
+        )
+
+    def _roll_call(self, keys: str, timeout: float) -> None:
+        for _ in self.session.liveliness().get(keys, timeout=timeout):
+            pass
+
+    @cached_property
+    def _hearings(self) -> dict[str, Hearing]:
+        """The receivers whose beats our commands return, by the name of these."""
         return {}
 
     @cached_property
-    def clock_server(self) -> Answers:
-        """Answers readers of a stamp that ask for our clock."""
-        key, member = clock_key(self.id), self.member
-
-        def answer(query: zenoh.Query) -> None:
-            clock: str | bytes = str(time.monotonic_ns())
-            if member:
-                clock = member.answer(self.id, bytes(query.payload or b"")[:64], str(clock))
-            query.reply(key, clock, express=True)
-            self.clock_asked.set()
-
-        # Not a callback: Zenoh would run it in a thread that keeps a program from ending which has not closed its bus.
-        return self._keep(Answers(self.session.declare_queryable(key, zenoh.handlers.RingChannel(GETS)), answer))
+    def _numbers(self) -> dict[str, Numbers]:
+        """Numbers our samples on each key."""
+        return {}
 
     def publisher(
-        self, key: str, kind: type[M], priority: str = "DATA", *, block: bool = False, wire: str = "",
+        self,
+        key: str,
+        kind: type[M],
+        priority: str = "DATA",
+        *,
+        block: bool = False,
+        wire: str = "",
         dead_man: bool = True,
-    ) -> Publisher[M]:  # fmt: skip
-        """A writer of `kind` on `key`. On a full link it waits (`block`), or else drops messages. `wire` replaces
-        the node's. `dead_man`: a publisher of commands is listed as a node, so that its end stops the robot at once;
-        without, its last command counts as long as that of a foreign program. Raises BusError for a wildcard, or a
-        key, priority or wire that does not exist, and TypeError for a `kind` that is not the class of a message.
+    ) -> Publisher[M]:
+        """A writer of `kind` on `key`. On a full link it waits (`block`), or else drops messages.
+        `wire` replaces the node's. `dead_man`: a publisher of commands is listed as a node, so that
+        its end stops the robot at once; without, its last command counts as long as that of a
+        foreign program. Raises BusError for a wildcard, or a key, priority or wire that does not
+        exist, and TypeError for a `kind` that is not the class of a message.
         """
         from holozen.messages import codec
 
@@ -95,35 +153,57 @@ class Bus(Node):
         self.define(kind)
         wire = checked_wire(wire or self.wire)
         make: Callable[..., Publisher[M]] = partial(Publisher, kind, wire, self._queued)
-        return self._publish(make, key, kind.ROS, codec.encoding(wire, kind), priority, block, dead_man)
+        return self._publish(
+            make, key, kind.ROS, codec.encoding(wire, kind), priority, block, dead_man
+        )
 
     def publisher_raw(
-        self, key: str, type_name: str, encoding: str, priority: str = "DATA", *, block: bool = False,
+        self,
+        key: str,
+        type_name: str,
+        encoding: str,
+        priority: str = "DATA",
+        *,
+        block: bool = False,
         dead_man: bool = True,
-    ) -> RawPublisher:  # fmt: skip
+    ) -> RawPublisher:
         """A writer of bytes, in that encoding by default; otherwise as `publisher`."""
         return self._publish(RawPublisher, key, type_name, encoding, priority, block, dead_man)
 
     def _publish(
-        self, make: Callable[..., P], key: str, type_name: str, encoding: str, priority: str, block: bool,
+        self,
+        make: Callable[..., P],
+        key: str,
+        type_name: str,
+        encoding: str,
+        priority: str,
+        block: bool,
         dead_man: bool,
-    ) -> P:  # fmt: skip
+    ) -> P:
         if priority not in PRIORITIES:
-            raise BusError(f"key {key!r}: no priority {priority!r}; there are {', '.join(PRIORITIES)}")
+            raise BusError(
+                f"key {key!r}: no priority {priority!r}; there are {', '.join(PRIORITIES)}"
+            )
         commands = wire.is_command(key, (type_name,))
         with one_line(f"key {key!r}"):
             if "*" in str(zenoh.KeyExpr(key)):
                 raise BusError(f"key {key!r}: write to one key; a wildcard would reach every robot")
             publisher = self.session.declare_publisher(
-                key, encoding=encoding, priority=getattr(zenoh.Priority, priority), express=commands,
-                congestion_control=zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP,
-            )  # fmt: skip
+                key,
+                encoding=encoding,
+                priority=getattr(zenoh.Priority, priority),
+                express=commands,
+                congestion_control=zenoh.CongestionControl.BLOCK
+                if block
+                else zenoh.CongestionControl.DROP,
+            )
         watch = partial(publisher.declare_matching_listener, zenoh.handlers.RingChannel(1))
         sign = partial(self.member.attachment, key, priority) if self.member and commands else None
-        writer = make(publisher, self.stamps(key), watch, sign)
+        echoes = self.echoes(key) if commands else None
+        writer = make(publisher, self.stamps(key), watch, sign, echoes)
         self._answer_gets(writer, key)
         if commands and dead_man:
-            _ = self.listing
+            self.announce_node()
         # Last, so that nodes that discover it can query it at once.
         writer.ends.append(self.announce("pub", type_name, key))
         return self._keep(writer)
@@ -139,8 +219,8 @@ class Bus(Node):
         return {}
 
     def _ring(self, key: str, depth: int, is_queryable: bool = False) -> Ring | None:
-        """A ring for a robot's key, `Fred/cmd_vel`, of what comes on those of all robots, `*/cmd_vel`; None for the
-        requests to a key without a robot's name.
+        """A ring for a robot's key, `Fred/cmd_vel`, of what comes on those of all robots,
+        `*/cmd_vel`; None for the requests to a key without a robot's name.
         """
         if (expression := _of_all(key)) == key and is_queryable:
             return None
@@ -152,10 +232,12 @@ class Bus(Node):
                     declared: Any = self.session.declare_queryable(expression, channel)
                 else:
                     declared = self.session.declare_subscriber(expression, channel)
-            dealer = self._dealers[expression, is_queryable] = self._keep(Dealer(declared, is_queryable))
+            dealer = self._dealers[expression, is_queryable] = self._keep(
+                Dealer(declared, is_queryable)
+            )
         if not is_queryable and key not in self._known:
-            # Zenoh looks up its way once for a key that is declared here, and for any other with each sample. It is
-            # never undeclared: senders may still use its number.
+            # Zenoh looks up its way once for a key that is declared here, and for any other with
+            # each sample. It is never undeclared: senders may still use its number.
             self._known[key] = self.session.declare_keyexpr(key)
         return dealer.ring(key, depth)
 
@@ -182,7 +264,9 @@ class Bus(Node):
             writer.gets.add(writer)
 
     def define(self, kind: type[Message]) -> None:
-        """Answer with the definition of a type that other processes may not have: one from the files of a package."""
+        """Answer with the definition of a type that other processes may not have: one from the
+        files of a package.
+        """
         interface = getattr(kind, "__interface__", None)
         if interface is None or interface.name in self._defined:
             return
@@ -197,32 +281,41 @@ class Bus(Node):
     def subscribe(
         self, key: str, *kinds: type[M], depth: int = 64, limit: int = 0, dealt: bool = False
     ) -> Subscription[M]:
-        """A reader of any of `kinds` that keeps the newest `depth`. Payloads over `limit` bytes are refused, and in the
-        secure set-up commands without proof. `dealt`: for a WaitSet, which reads higher priorities first; the newest
-        `depth` of each are kept, and all robots' keys of that name share a subscriber. Raises BusError for a wrong key,
-        and TypeError without `kinds`, or for one that is not the class of a message.
+        """A reader of any of `kinds` that keeps the newest `depth`. Payloads over `limit` bytes are
+        refused, and in the secure set-up commands without proof. `dealt`: for a WaitSet, which
+        reads higher priorities first; the newest `depth` of each are kept, and all robots' keys of
+        that name share a subscriber. Raises BusError for a wrong key, and TypeError without
+        `kinds`, or for one that is not the class of a message.
         """
         from holozen.messages import codec
 
         _check_types(key, *kinds or (None,))
         ring = self._ring(key, depth) if dealt else None
-        raw = self._keep(RawSubscriber(ring, limit)) if ring else self.subscribe_raw(key, depth, limit)
+        raw = (
+            self._keep(RawSubscriber(ring, limit))
+            if ring
+            else self.subscribe_raw(key, depth, limit)
+        )
         raw.ends.append(self.announce("sub", kinds[0].ROS, key))
         is_command = wire.is_command(key, (kind.ROS for kind in kinds))
         decode = codec.decoder(kinds, tolerant=not is_command)
-        return Subscription(raw, decode, self._verifier.refusal if is_command and self._verifier else None)
+        return Subscription(
+            raw, decode, self._verifier.refusal if is_command and self._verifier else None
+        )
 
     @cached_property
     def _verifier(self) -> Verifier | None:
         """Checks the proofs of others; None outside the secure set-up."""
         if not self._secure:
             return None
-        from holozen.transport.members import Verifier  # loads cryptography
+        from holozen.transport.authenticator import authenticator
 
-        return Verifier(self._secure)
+        return authenticator().verifier(self._secure)
 
     def latest(self, key: str, kind: type[M]) -> Latest[M]:
-        """The newest message on `key`, with its age. Payloads over LARGEST_STATE bytes are ignored."""
+        """The newest message on `key`, with its age. Payloads over LARGEST_STATE bytes are
+        ignored.
+        """
         return Latest(self.state(key, kind))
 
     def state(self, key: str, kind: type[M]) -> Subscription[M]:
@@ -230,51 +323,58 @@ class Bus(Node):
         return self.subscribe(key, kind, depth=1, limit=LARGEST_STATE)
 
     def serve(
-        self, key: str, request: type[M], reply: type[R], answer: Callable[[M], R], room: int = ROOM,
-        shared: bool = False, dealt: bool = False, stops: bool = False,
-    ) -> Server:  # fmt: skip
+        self,
+        key: str,
+        request: type[M],
+        reply: type[R],
+        answer: Callable[[M], R],
+        room: int = ROOM,
+        shared: bool = False,
+        dealt: bool = False,
+        stops: bool = False,
+    ) -> Server:
         """Answer requests on `key`. The caller runs it: `answer_pending()` in a loop, or `start()`.
 
-        At most `room` requests wait; more are refused as busy. A request on a `shared` key goes to all of its servers;
-        those that have no part in it raise Elsewhere. `dealt`: all robots' keys of that name share a queryable, which a
-        WaitSet reads. `stops` as in Server. Raises BusError for a wrong key, and TypeError for a `request` or a `reply`
-        that is not the class of a message.
+        At most `room` requests wait; more are refused as busy. A request on a `shared` key goes to
+        all of its servers; those that have no part in it raise Elsewhere. `dealt`: all robots' keys
+        of that name share a queryable, which a WaitSet reads. `stops` as in Server. Raises BusError
+        for a wrong key, and TypeError for a `request` or a `reply` that is not the class of a
+        message.
         """
         _check_types(key, request, reply)
         token = self.announce("srv", reply.ROS, key)
         queryable: Any = self._ring(key, RING, is_queryable=True) if dealt else None
         if not queryable:
-            queryable = self.session.declare_queryable(key, zenoh.handlers.RingChannel(RING), complete=not shared)
-        server = self._keep(Server(queryable, key, request, reply, answer, self.wire, room, stops))
+            queryable = self.session.declare_queryable(
+                key, zenoh.handlers.RingChannel(RING), complete=not shared
+            )
+        server = self._keep(
+            Server(queryable, key, request, reply, answer, self.wire, self.own_time, room, stops)
+        )
         server.ends.append(token)
         return server
 
     def call(self, key: str, request: Message, reply: type[R], timeout: float = 5.0) -> R:
         """Call a service; waits for it to appear and to reply, for at most `timeout` seconds.
 
-        Raises ServiceError with the service's own reason, without a reply, or for a malformed one; BusError for a wrong
-        key or `timeout`, and TypeError for a wrong type.
+        Raises ServiceError with the service's own reason, without a reply, or for a malformed one;
+        BusError for a wrong key or `timeout`, and TypeError for a wrong type.
         """
         _check_call(key, request, reply, timeout)
         return services.call(self, key, request, reply, timeout)[0]
 
     def call_all(self, key: str, request: Message, reply: type[R], timeout: float = 5.0) -> list[R]:
-        """As `call`, with the replies of all servers of the key that did not refuse. Raises ServiceError if all did."""
+        """As `call`, with the replies of all servers of the key that did not refuse. Raises
+        ServiceError if all did.
+        """
         _check_call(key, request, reply, timeout)
         return services.call(self, key, request, reply, timeout, everyone=True)
 
-    def peer_clocks(self, has: Callable[[str], bool]) -> PeerClocks:
-        """The clocks of other sessions, to measure the age of their commands. `has`: whether a session is alive."""
-
-        def ask(session: str, nonce: bytes, timeout: float) -> Replies:
-            # All servers are asked, since any session may serve this key.
-            return self.ask_all(clock_key(session), timeout, replier=session, payload=nonce or None)
-
-        return PeerClocks(ask, has, signer=self._verifier.answerer if self._verifier else None)
-
 
 def _of_all(key: str) -> str:
-    """The key expression of all robots' keys of that name: `*/odom` for `Fred/odom`, and `odom` for `odom`."""
+    """The key expression of all robots' keys of that name: `*/odom` for `Fred/odom`, and `odom` for
+    `odom`.
+    """
     first, _, rest = key.partition("/")
     return f"*/{rest}" if rest and not first.startswith("@") else key
 
@@ -297,6 +397,9 @@ def _check_call(key: object, request: object, reply: object, timeout: float) -> 
 
     _check_types(key, reply)
     if not isinstance(request, Message):
-        raise TypeError(f"key {key!r}: the request {shorten(repr(request))} is not a message, such as TriggerRequest()")
+        raise TypeError(
+            f"key {key!r}: the request {shorten(repr(request))} is not a message, such as "
+            "TriggerRequest()"
+        )
     if not (isinstance(timeout, int | float) and 0 <= timeout <= LONGEST_CALL):
         raise BusError(f"key {key!r}: timeout {timeout!r}: use 0 to {LONGEST_CALL:g} s")

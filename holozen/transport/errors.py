@@ -3,6 +3,7 @@
 from holozen.console import Failure
 
 TIMEOUT = b"Timeout"  # Zenoh's own reply for a service that does not reply
+LONGEST_KEY = 1000  # characters; Zenoh aborts the processes that it tells a far longer one
 
 
 class BusError(Failure):
@@ -10,8 +11,8 @@ class BusError(Failure):
 
 
 class ServiceError(BusError):
-    """A service replied with an error, or did not reply. Handlers raise it to refuse a request, with more `fields` of
-    the error reply.
+    """A service replied with an error, or did not reply. Handlers raise it to refuse a request,
+    with more `fields` of the error reply.
     """
 
     def __init__(self, text: str, **fields: object) -> None:

@@ -1,7 +1,8 @@
 """The parameters of a running node: named values that can be read and set, each within its range.
 
-They are served as in ROS 2's rcl_interfaces, on `<node>/list_parameters`, `get_parameters`, `set_parameters` and
-`describe_parameters`. A request to set several is applied as a whole or not at all.
+They are served as in ROS 2's rcl_interfaces, on `<node>/list_parameters`, `get_parameters`,
+`set_parameters` and `describe_parameters`. A request to set several is applied as a whole or not at
+all.
 """
 
 import threading
@@ -23,8 +24,9 @@ if TYPE_CHECKING:
     from holozen.bus import Bus
 
 MAX_NAMES = 1000  # names in one request
-LONGEST = 80  # characters of a value or a name in a message
-TWIN_WAIT, TWIN_LOOK = 1.0, 0.05  # s for another node of the same name to be discovered, and between two looks for it
+MAX_SHOWN = 80  # characters of a value or a name in a message
+# s for another node of the same name to be discovered, and between two looks for it
+TWIN_WAIT, TWIN_LOOK = (1.0, 0.05)
 ELSE = "not set, since another parameter of the request was refused"
 
 
@@ -67,7 +69,9 @@ class Choice(Struct, frozen=True):
 
     def checked(self, value: Any) -> str:
         """`value` if it is allowed. Raises ValueError with the allowed values."""
-        if isinstance(value, str) and (value == self.read() or (self.write and value in self.words)):
+        if isinstance(value, str) and (
+            value == self.read() or (self.write and value in self.words)
+        ):
             return value
         if self.write is None:
             raise ValueError(f"{self.name}: it is read-only")
@@ -76,29 +80,49 @@ class Choice(Struct, frozen=True):
     def described(self) -> r.ParameterDescriptor:
         """Its description and allowed values."""
         words = f"one of {', '.join(self.words)}" if self.words else ""
-        return r.ParameterDescriptor(self.name, r.STRING, self.about, words, read_only=self.write is None)
+        return r.ParameterDescriptor(
+            self.name, r.STRING, self.about, words, read_only=self.write is None
+        )
 
 
 Parameter = Number | Choice
 
 
 class Parameters:
-    """Serves the parameters that `declared` returns. Call `answer()` in a loop, or `start()` once."""
+    """Serves the parameters that `declared` returns. Call `answer()` in a loop, or `start()`
+    once.
+    """
 
     def __init__(
-        self, bus: "Bus", node: str, declared: Callable[[], Iterable[Parameter]], report: Callable[[str], None] = report
+        self,
+        bus: "Bus",
+        node: str,
+        declared: Callable[[], Iterable[Parameter]],
+        report: Callable[[str], None] = report,
     ) -> None:
         self._node, self._declared, self._report = node, declared, report
         self._lock = threading.Lock()  # no reads of a partly applied request
-        self._set_server = bus.serve(f"{node}/set_parameters", r.SetParametersRequest, r.SetParametersReply, self._set)
+        self._set_server = bus.serve(
+            f"{node}/set_parameters", r.SetParametersRequest, r.SetParametersReply, self._set
+        )
         self._servers: list[Server] = [
             self._set_server,
-            bus.serve(f"{node}/get_parameters", r.GetParametersRequest, r.GetParametersReply, self._get),
             bus.serve(
-                f"{node}/describe_parameters", r.DescribeParametersRequest, r.DescribeParametersReply, self._describe
+                f"{node}/get_parameters", r.GetParametersRequest, r.GetParametersReply, self._get
+            ),
+            bus.serve(
+                f"{node}/describe_parameters",
+                r.DescribeParametersRequest,
+                r.DescribeParametersReply,
+                self._describe,
             ),
             # Last: when its token appears, the others are there.
-            bus.serve(f"{node}/list_parameters", r.ListParametersRequest, r.ListParametersReply, self._list),
+            bus.serve(
+                f"{node}/list_parameters",
+                r.ListParametersRequest,
+                r.ListParametersReply,
+                self._list,
+            ),
         ]
 
     def answer(self) -> bool:
@@ -119,23 +143,29 @@ class Parameters:
     def _get(self, request: r.GetParametersRequest) -> r.GetParametersReply:
         """The values of some parameters. Raises ServiceError for an unknown name."""
         with self._lock:
-            return r.GetParametersReply([r.ParameterValue.of(each.read()) for each in self._named(request.names)])
+            return r.GetParametersReply(
+                [r.ParameterValue.of(each.read()) for each in self._named(request.names)]
+            )
 
     def _describe(self, request: r.DescribeParametersRequest) -> r.DescribeParametersReply:
         """The descriptions of some parameters. Raises ServiceError for an unknown name."""
         return r.DescribeParametersReply([each.described() for each in self._named(request.names)])
 
     def _set(self, request: r.SetParametersRequest) -> r.SetParametersReply:
-        """Set all parameters of a request, or none: one result for each, with the reason of a refusal."""
+        """Set all parameters of a request, or none: one result for each, with the reason of a
+        refusal.
+        """
         _check_count(request.parameters)
         with self._lock:
             known = self._known()
             reasons = [self._fault(each, known) for each in request.parameters]
             names = [each.name for each in request.parameters]
             if twice := next((name for name in names if names.count(name) > 1), ""):
-                reasons = [f"{twice[:LONGEST]!r} is set twice in one request"] * len(names)
+                reasons = [f"{twice[:MAX_SHOWN]!r} is set twice in one request"] * len(names)
             if any(reasons):
-                return r.SetParametersReply([r.SetParametersResult(False, reason or ELSE) for reason in reasons])
+                return r.SetParametersReply(
+                    [r.SetParametersResult(False, reason or ELSE) for reason in reasons]
+                )
             for each in request.parameters:
                 self._write(known[each.name], each.value.plain())
         return r.SetParametersReply([r.SetParametersResult(True) for _ in names])
@@ -148,7 +178,9 @@ class Parameters:
         parameter.write(now)
         by = self._set_server.caller or "an unknown caller"
         text = f"{_formatted(now)} {unit}".rstrip()
-        self._report(f"{self._node}: {parameter.name} is {text} (was {_formatted(before)}), set by {by}")
+        self._report(
+            f"{self._node}: {parameter.name} is {text} (was {_formatted(before)}), set by {by}"
+        )
 
     def _fault(self, asked: r.Parameter, known: dict[str, Parameter]) -> str:
         if asked.name not in known:
@@ -172,7 +204,9 @@ class Parameters:
 
 
 def warn_of_twin(bus: "Bus", node: str) -> None:
-    """Report, soon after this returns, another process whose parameters have the name of this `node` too."""
+    """Report, soon after this returns, another process whose parameters have the name of this
+    `node` too.
+    """
 
     def look() -> None:
         with suppress(BusError), bus.graph(PARAMETERS.replace("**", node)) as graph:
@@ -189,8 +223,8 @@ def warn_of_twin(bus: "Bus", node: str) -> None:
 def unknown(node: str, name: str, known: Iterable[str]) -> str:
     """The error for an unknown parameter, with the closest name or the known ones."""
     names = list(known)
-    hint = suggest(name[:LONGEST], names) or f"; it has {', '.join(names[:20])}"
-    return f"{node} has no parameter {name[:LONGEST]!r}{hint}"
+    hint = suggest(name[:MAX_SHOWN], names) or f"; it has {', '.join(names[:20])}"
+    return f"{node} has no parameter {name[:MAX_SHOWN]!r}{hint}"
 
 
 def _check_count(asked: list[r.Parameter] | list[str]) -> None:
@@ -200,14 +234,22 @@ def _check_count(asked: list[r.Parameter] | list[str]) -> None:
 
 def is_below(name: str, prefixes: list[str], depth: int) -> bool:
     """Whether ListParameters includes a name."""
-    rests = [name[len(p) + 1 :] for p in prefixes if name.startswith(f"{p}.")] or [""] * (name in prefixes)
+    rests = [name[len(p) + 1 :] for p in prefixes if name.startswith(f"{p}.")] or [""] * (
+        name in prefixes
+    )
     rests = rests if prefixes else [name]
     return any(not depth or rest.count(".") < depth for rest in rests)
 
 
 def _shown(value: object) -> str:
-    text = "no value" if value is None else _formatted(value) if isinstance(value, float) else repr(value)
-    return shorten(text, LONGEST)
+    text = (
+        "no value"
+        if value is None
+        else _formatted(value)
+        if isinstance(value, float)
+        else repr(value)
+    )
+    return shorten(text, MAX_SHOWN)
 
 
 def _formatted(value: object) -> str:

@@ -11,42 +11,55 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from holozen.console import printable
 from holozen.messages import CodecError
 from holozen.transport.samples import Answers, Declared, RawSubscriber, Sample, until_closed
-from holozen.wire import is_command
+from holozen.wire import is_command, stops
 
 if TYPE_CHECKING:
     from holozen.messages import Message
+    from holozen.transport.beat import Echoes
 
 M = TypeVar("M", bound="Message")
 
-GET_PATIENCE = 1.0  # s that a get waits for the next message of a publisher that sends only what is wanted
-SELDOM = 16  # messages between two looks whether the readers have left
+# s that a get waits for the next message of a publisher that sends only what is wanted
+GET_PATIENCE = 1.0
+MATCH_CHECK_EVERY = 16  # polls between checks that a subscriber remains
 SLOWEST = 5.0  # s; after this long any stream is stale
 
 
 class RawPublisher(Declared):
-    """Writes encoded payloads; a `get` on its key is answered with the last one, see Gets. Made by `Bus.publisher_raw`.
+    """Writes encoded payloads; a `get` on its key is answered with the last one, see Gets. Made by
+    `Bus.publisher_raw`.
 
-    Each carries the attachment that `stamp` makes, with the sender, the time of sending, and a number by which readers
-    count lost samples. `sign` makes a command's attachment of a stamp, the encoding and the payload. `watch` declares a
+    Each carries the attachment that `stamp` makes, with the sender, and a number by which readers
+    count lost samples; that of a command also has the `echoes` of its receivers' beats. `sign`
+    makes a command's attachment of a stamp, the encoding and the payload. `watch` declares a
     listener of whether anyone subscribes.
     """
 
     def __init__(
         self,
         publisher: Any,
-        stamp: Callable[[], bytes],
+        stamp: Callable[..., bytes],
         watch: Callable[[], Any],
         sign: Callable[[bytes, str, bytes], bytes] | None,
+        echoes: Echoes | None = None,
     ) -> None:
         super().__init__(publisher)
         self.key: Any = publisher.key_expr
         self.gets: Gets | None = None  # set by the bus
-        self._publisher, self._put, self._stamp, self._sign = publisher, publisher.put, stamp, sign
+        self.echoes = echoes  # of commands alone
+        self._publisher = publisher
+        self._put = publisher.put
+        self._stamp = stamp
+        self._sign = sign
         self._encoding = publisher.encoding
-        self._last: tuple[bytes, str | None] | None = None  # with its Encoding, where that is not this publisher's
+        # with its Encoding, where that is not this publisher's
+        self._last: tuple[bytes, str | None] | None = None
         self._statuses: Any = None
-        self._watch, self._is_matched, self._looks = watch, False, 0
-        self._next: threading.Event | None = None  # set by the next message; there once `wanted` was read
+        self._watch = watch
+        self._is_matched = False  # whether anyone subscribed at the last check
+        self._polls = 0
+        # set by the next message; there once `poll_wanted` was called
+        self._next: threading.Event | None = None
 
     @property
     def matched(self) -> bool:
@@ -54,10 +67,9 @@ class RawPublisher(Declared):
         with self.unless_closed():
             return bool(self._publisher.matching_status.matching)
 
-    @property
-    def wanted(self) -> bool:
-        """Whether anyone subscribes, or a get waits. The caller may leave out messages that are not wanted: from the
-        first look on, a get is answered with the next message.
+    def poll_wanted(self) -> bool:
+        """Look whether anyone subscribes, or a get waits. The caller may leave out messages that
+        are not wanted: from the first poll on, a get is answered with the next message.
         """
         if self._next is None:
             with self.unless_closed():
@@ -65,20 +77,39 @@ class RawPublisher(Declared):
             self._next = threading.Event()
             self.ends.append(listener)
             self._statuses = listener.handler
-        # A reader that has left costs some messages that go nowhere; one that came is looked for each time.
-        self._looks += 1
-        if (not self._is_matched or self._looks % SELDOM == 0) and (status := self._statuses.try_recv()) is not None:
-            self._is_matched = status.matching
+        self._polls += 1
+        # A subscriber that has left costs some messages that go nowhere; one that came is looked
+        # for at each poll.
+        if not self._is_matched or self._polls % MATCH_CHECK_EVERY == 0:
+            status = self._statuses.try_recv()
+            if status is not None:
+                self._is_matched = status.matching
         return self._is_matched or not self._next.is_set()
 
-    def put_bytes(self, payload: bytes, encoding: str | None = None) -> None:
-        """Send an encoded payload, by default in the encoding of this publisher. Raises BusError once it, or the bus,
-        is closed.
+    def put_bytes(
+        self,
+        payload: bytes,
+        encoding: str | None = None,
+        waited: float = 0.0,
+        echoed: bytes | None = None,
+    ) -> None:
+        """Send an encoded payload, by default in the encoding of this publisher. Raises BusError
+        once it, or the bus, is closed.
+
+        A command goes with the echoes of its receivers' beats, less the seconds that it has
+        `waited` since it was made; or with those that its maker has `echoed`, as from
+        `Echoes.attached`. A motion without any is refused by a robot that beats: ask
+        `Echoes.may_command` first.
         """
         self._last = payload, encoding
-        attachment = self._stamp()
-        if self._sign:
-            attachment = self._sign(attachment, str(encoding or self._encoding), payload)
+        if self.echoes is None:
+            attachment = self._stamp()
+        else:
+            if echoed is None:
+                echoed = self.echoes.vouched(waited) if waited else self.echoes.attached()
+            attachment = self._stamp(echoed)
+            if self._sign:
+                attachment = self._sign(attachment, str(encoding or self._encoding), payload)
         try:  # `unless_closed` would take longer
             if encoding:
                 self._put(payload, encoding=encoding, attachment=attachment)
@@ -90,9 +121,20 @@ class RawPublisher(Declared):
         if self._next is not None and not self._next.is_set():
             self._next.set()
 
+    def put_plain(self, payload: bytes) -> None:
+        """Send a command as a foreign program does, with a name alone: it counts for 0.5 s from its
+        arrival. In the secure set-up it is signed as any other.
+        """
+        if self._sign:
+            return self.put_bytes(payload)
+        self._last = payload, None
+        with self.unless_closed():
+            self._put(payload, attachment=self._stamp().partition(b";")[0])
+        return None
+
     def leave_to_parent(self, refuse: Callable[..., Any]) -> None:
         """Send no more."""
-        self._put = refuse
+        self._put = self._stamp = refuse
 
     def want(self) -> None:
         """Let the next message be sent also without subscribers: a get waits for it."""
@@ -100,7 +142,9 @@ class RawPublisher(Declared):
             self._next.clear()
 
     def reply(self, query: Any, deadline: float) -> None:
-        """Answer a get with the last message; after `want`, wait for the next until `deadline` (s, monotonic)."""
+        """Answer a get with the last message; after `want`, wait for the next until `deadline` (s,
+        monotonic).
+        """
         if self._next is not None:
             self._next.wait(max(0.0, deadline - time.monotonic()))
         if self._last is not None:
@@ -112,15 +156,21 @@ class RawPublisher(Declared):
         super().close()
         if self.gets:
             self.gets.remove(self)
+        if self.echoes:
+            self.echoes.close()
 
 
 class Publisher(RawPublisher, Generic[M]):
-    """Writes messages, in the encoding of its `wire`. Those in `queued` wait for `Bus.send_queued`. Made by
-    `Bus.publisher`.
+    """Writes messages, in the encoding of its `wire`. Those in `queued` wait for `Bus.send_queued`.
+    Made by `Bus.publisher`.
     """
 
     def __init__(
-        self, kind: type[M], wire: str, queued: list[tuple[RawPublisher, bytes, str | None]], *declared: Any
+        self,
+        kind: type[M],
+        wire: str,
+        queued: list[tuple[RawPublisher, bytes, str | None]],
+        *declared: Any,
     ) -> None:
         from holozen.messages import codec
 
@@ -130,17 +180,30 @@ class Publisher(RawPublisher, Generic[M]):
         self._write = codec.writer(kind, wire, checks=is_command(str(self.key), (kind.ROS,)))
         self._queued = queued
 
-    def put(self, message: M) -> None:
-        """Send one message. With a number that is not finite it raises codec.CodecError, or is sent as CDR, depending
-        on its type; a command with a value of a wrong type raises it too. Raises TypeError for a message of another
-        type, and BusError once it, or the bus, is closed.
+    def put(self, message: M, waited: float = 0.0, echoed: bytes | None = None) -> None:
+        """Send one message. With a number that is not finite it raises codec.CodecError, or is sent
+        as CDR, depending on its type; a command with a value of a wrong type raises it too. Raises
+        TypeError for a message of another type, and BusError once it, or the bus, is closed.
+
+        A command moves a robot only with an echo of its beat, see beat.py. So as long as a robot is
+        there of which no beat has come, motions are not sent, which is reported. `waited`: the
+        seconds since the command was made.
         """
         if not isinstance(message, self._kind):
             raise self._mistaken(message)
-        self.put_bytes(*self._write(message))
+        written = self._write(message)
+        if (
+            not self.echoes
+            or (self.echoes.was_heard if echoed is None else echoed)
+            or stops(message, self._kind.ROS)
+            or self.echoes.may_command()
+        ):
+            self.put_bytes(*written, waited, echoed)
 
     def queue(self, message: M) -> None:
-        """As `put`, but `Bus.send_queued` sends it: many messages that are sent at once take Zenoh less time."""
+        """As `put`, but `Bus.send_queued` sends it: many messages that are sent at once take Zenoh
+        less time.
+        """
         if not isinstance(message, self._kind):
             raise self._mistaken(message)
         self._queued.append((self, *self._write(message)))
@@ -153,7 +216,9 @@ class Publisher(RawPublisher, Generic[M]):
 
 
 class Gets(Answers):
-    """Answers each get on a key expression with the last messages of some publishers there, from one thread."""
+    """Answers each get on a key expression with the last messages of some publishers there, from
+    one thread.
+    """
 
     def __init__(self, queryable: Any) -> None:
         self._publishers = set[RawPublisher]()
@@ -161,7 +226,9 @@ class Gets(Answers):
         super().__init__(queryable, self._reply)
 
     def add(self, publisher: RawPublisher) -> bool:
-        """Answer for this publisher too; returns whether it can: it ended with the last one that was removed."""
+        """Answer for this publisher too; returns whether it can: it ended with the last one that
+        was removed.
+        """
         with self._lock:
             if self.ends:
                 self._publishers.add(publisher)
@@ -195,11 +262,15 @@ class Received(Sample, Generic[M]):
 class Subscription(Generic[M]):
     """Messages in order of arrival; if too many wait, the oldest are dropped.
 
-    `decode` makes a message of a sample, or raises CodecError. `refusal` returns why a sample is not read, or "".
+    `decode` makes a message of a sample, or raises CodecError. `refusal` returns why a sample is
+    not read, or "".
     """
 
     def __init__(
-        self, samples: RawSubscriber, decode: Callable[[Sample], M], refusal: Callable[[Sample], str] | None = None
+        self,
+        samples: RawSubscriber,
+        decode: Callable[[Sample], M],
+        refusal: Callable[[Sample], str] | None = None,
     ) -> None:
         self.raw, self._decode, self._refusal = samples, decode, refusal
 
@@ -210,7 +281,9 @@ class Subscription(Generic[M]):
         return None if sample is None else self._received(sample)
 
     def waiting(self, first: Any) -> list[Received[M]]:
-        """The messages that wait, after the sample `first` of `raw.channel`; None: nothing waited."""
+        """The messages that wait, after the sample `first` of `raw.channel`; None: nothing
+        waited.
+        """
         samples = [] if first is None else [first, *iter(self.raw.channel.try_recv, None)]
         return [self._received(sample) for sample in samples]
 
@@ -242,21 +315,25 @@ class Arrivals(Generic[M]):
     def __init__(self) -> None:
         self.newest: M | None = None
         self.count = 0
-        self._at = -math.inf
+        self._at: float | None = None  # when the newest arrived
         self._gaps = (0.0, 0.0)  # the last two, to ignore a single hiccup
 
     def record(self, message: M, now: float) -> None:
         """Record a message."""
-        self._gaps = (self._gaps[1], now - self._at if self.count else 0.0)
-        self.newest, self._at = message, now
+        gap = 0.0 if self._at is None else now - self._at
+        self._gaps = (self._gaps[1], gap)
+        self.newest = message
+        self._at = now
         self.count += 1
 
     def age(self, now: float) -> float:
         """Seconds since the newest arrived; infinite before the first."""
-        return now - self._at
+        return math.inf if self._at is None else now - self._at
 
     def patience(self, silence: float) -> float:
-        """The age from which the newest is stale: `silence`, or three periods of a stream that is slower than that."""
+        """The age from which the newest is stale: `silence`, or three periods of a stream that is
+        slower than that.
+        """
         return max(silence, min(3 * min(self._gaps), SLOWEST))
 
 
@@ -265,7 +342,8 @@ class Latest(Generic[M]):
 
     def __init__(self, subscription: Subscription[M]) -> None:
         self._subscription, self.raw = subscription, subscription.raw
-        self._lock = threading.Lock()  # Ctrl-C just after a Condition has taken its lock would leave it locked
+        # Ctrl-C just after a Condition has taken its lock would leave it locked
+        self._lock = threading.Lock()
         self._newer = threading.Condition(self._lock)
         self._arrivals: Arrivals[M] = Arrivals()
         self.error = ""  # why the newest of the samples that cannot be decoded cannot
@@ -277,7 +355,9 @@ class Latest(Generic[M]):
         return self._arrivals.count
 
     def read(self) -> tuple[M | None, float]:
-        """The newest message (None before the first; `error` may say why) and its age in seconds since it arrived."""
+        """The newest message (None before the first; `error` may say why) and its age in seconds
+        since it arrived.
+        """
         with self._lock:
             return self._arrivals.newest, self._arrivals.age(time.monotonic())
 
@@ -287,7 +367,9 @@ class Latest(Generic[M]):
             return self._arrivals.patience(silence)
 
     def wait(self, after: int, timeout: float) -> bool:
-        """Wait until more than `after` messages have arrived, at most `timeout` seconds; returns whether they have."""
+        """Wait until more than `after` messages have arrived, at most `timeout` seconds; returns
+        whether they have.
+        """
         with self._lock:
             return self._newer.wait_for(lambda: self.count > after, timeout)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import threading
 import time
 from collections import deque
@@ -16,12 +17,24 @@ from holozen.transport.errors import BusError
 
 T = TypeVar("T")
 
+_ECHOES = re.compile(rb"[0-9a-f]{1,32}:[0-9]{1,19}(?:,[0-9a-f]{1,32}:[0-9]{1,19}){0,15}")
+
 MAX_ATTACHMENT_BYTES = 1000  # longer ones are not read
 LARGE = 1_000_000  # bytes; memory of larger payloads is returned to the system
 MAX_DEALT = 4096  # samples at a time
 TRIM_AFTER = (1.0, 2.0, 4.0, 8.0)  # s
 M_TRIM_THRESHOLD = -1  # mallopt(3)
-PRIORITIES = ("REAL_TIME", "INTERACTIVE_HIGH", "INTERACTIVE_LOW", "DATA_HIGH", "DATA", "DATA_LOW", "BACKGROUND")
+MAX_DIGITS = 19  # of a number in an attachment, or a time in ns
+MAX_ECHOES = 8  # receivers of one command: more do not fit into its attachment
+PRIORITIES = (
+    "REAL_TIME",
+    "INTERACTIVE_HIGH",
+    "INTERACTIVE_LOW",
+    "DATA_HIGH",
+    "DATA",
+    "DATA_LOW",
+    "BACKGROUND",
+)
 """Zenoh's priorities, the strongest first; Zenoh counts them from 1."""
 
 
@@ -30,21 +43,53 @@ def source(node: str, session: str) -> str:
     return f"{node}@{session[:6]}"
 
 
+Echo = tuple[str, int]
+"""The session of a receiver, and its own time in ns that a sender has heard of it, see beat.py."""
+
+
 class Stamp(NamedTuple):
-    """How a sample was sent: the session, its number among those of the session on this key, and the sender's clock in
-    s (monotonic); and whose certificate the sender claims, in the secure set-up.
+    """How a sample was sent.
+
+    Attributes:
+        session: The sender's session.
+        number: Its number among those of the session on this key, see Numbers.
+        echoes: The beats of receivers that it returns.
+        member: Whose certificate the sender claims, in the secure set-up.
     """
 
     session: str
     number: int
-    sent: float
+    echoes: tuple[Echo, ...]
     member: str = ""
 
 
-def stamps(node: str, session: str, numbers: Iterator[int]) -> Callable[[], bytes]:
-    """A function that makes attachments with sender and stamp: `node@session;number;nanoseconds`."""
+class Numbers:
+    """Numbers the samples of a session on one key, from 0.
+
+    It begins anew at the first command that echoes a beat: nobody was there to hear those before
+    it, so a robot that misses them has missed nothing.
+    """
+
+    def __init__(self) -> None:
+        self._next = 0
+        self._has_echoed = False
+
+    def take(self, echoes: bool) -> int:
+        """The number of the next sample. `echoes`: whether it echoes a beat."""
+        if echoes and not self._has_echoed:
+            self._has_echoed = True
+            self._next = 0
+        number = self._next
+        self._next += 1
+        return number
+
+
+def stamps(node: str, session: str, numbers: Numbers) -> Callable[..., bytes]:
+    """A function that makes attachments with sender and stamp: `node@session;number;ECHOES`. It is
+    given the echoes of a command; what commands nothing has none.
+    """
     start = f"{node}@{session};".encode()
-    return lambda: b"%b%d;%d" % (start, next(numbers), time.monotonic_ns())
+    return lambda echoes=b"": b"%b%d;%b" % (start, numbers.take(bool(echoes)), echoes)
 
 
 def source_in(attachment: Any) -> str:
@@ -56,15 +101,27 @@ def source_in(attachment: Any) -> str:
 
 
 def _stamp_parts(attachment: Any) -> list[bytes]:
-    """The parts of an attachment with a sender, its sample's number and a time; empty if those are missing or
-    malformed. A signature may follow, see members.py.
+    """The parts of an attachment with a sender, its sample's number and echoes; empty if those are
+    missing or malformed. A signature may follow, see authenticator.py.
     """
-    parts = bytes(attachment).split(b";") if attachment and len(attachment) <= MAX_ATTACHMENT_BYTES else []
-    well_formed = len(parts) in (3, 4) and all(part.isdigit() and len(part) < 20 for part in parts[1:3])
-    return parts if well_formed else []
+    parts = (
+        bytes(attachment).split(b";")
+        if attachment and len(attachment) <= MAX_ATTACHMENT_BYTES
+        else []
+    )
+    well_formed = len(parts) in (3, 4) and parts[1].isdigit() and len(parts[1]) <= MAX_DIGITS
+    return parts if well_formed and (not parts[2] or _ECHOES.fullmatch(parts[2])) else []
 
 
-def _stamp_in(attachment: Any) -> Stamp | None:
+def echoes_in(text: bytes) -> tuple[Echo, ...]:
+    """The echoes in the text `SESSION:NS,...` of an attachment; none if it is malformed."""
+    if not _ECHOES.fullmatch(text):
+        return ()
+    pairs = (each.split(":") for each in text.decode().split(","))
+    return tuple((session, int(ns)) for session, ns in pairs)
+
+
+def stamp_in(attachment: Any) -> Stamp | None:
     """The stamp in an attachment; None if it is missing or malformed."""
     if not (parts := _stamp_parts(attachment)):
         return None
@@ -72,18 +129,21 @@ def _stamp_in(attachment: Any) -> Stamp | None:
     if not 0 < len(session) <= 32 or not session.isalnum():
         return None
     member = name.partition(b"/")[0].decode(errors="replace")
-    return Stamp(session.decode(), int(parts[1]), int(parts[2]) * 1e-9, member)
+    return Stamp(session.decode(), int(parts[1]), echoes_in(parts[2]), member)
 
 
 def release_memory() -> None:
-    """Return the memory of a refused payload to the system, now and in the next seconds: the C library would keep it.
+    """Return the memory of a refused payload to the system, now and in the next seconds: the C
+    library would keep it.
 
-    It came in fragments, some of which lie between memory in use. Call it before the payload is freed.
+    It came in fragments, some of which lie between memory in use. Call it before the payload is
+    freed.
     """
     global _trimmer
     _keep_little()
     _refused.set()
-    if _trimmer is None or not _trimmer.is_alive():  # none, or a forked process, which has no threads
+    # none, or a forked process, which has no threads
+    if _trimmer is None or not _trimmer.is_alive():
         _trimmer = threading.Thread(target=_trim, name="trim", daemon=True)
         _trimmer.start()
 
@@ -113,7 +173,9 @@ def _keep_little() -> None:
 
 
 def _trim() -> None:
-    """Trim after each refusal, those during a trim included; again later, since parts of it may have been in use."""
+    """Trim after each refusal, those during a trim included; again later, since parts of it may
+    have been in use.
+    """
     while library := _c_library():
         _refused.wait()
         _refused.clear()
@@ -123,11 +185,11 @@ def _trim() -> None:
 
 
 class Sample:
-    """A received sample. If its `size` in bytes is over the reader's limit, or its attachment is too long, that is its
-    `oversize`, else 0, and it has no payload. A limit of 0 means no limit.
+    """A received sample. If its `size` in bytes is over the reader's limit, or its attachment is
+    too long, that is its `oversize`, else 0, and it has no payload. A limit of 0 means no limit.
 
-    Most readers need only the payload, so the rest is read from Zenoh's sample on demand. The decoder puts its
-    result into `message`, or the reason why it has none into `error`.
+    Most readers need only the payload, so the rest is read from Zenoh's sample on demand. The
+    decoder puts its result into `message`, or the reason why it has none into `error`.
     """
 
     __slots__ = ("_sample", "_stamp", "error", "message", "oversize", "payload")
@@ -188,18 +250,22 @@ class Sample:
     def stamp(self) -> Stamp | None:
         """Its stamp as claimed by the sender; None without one."""
         if self._stamp is None:
-            self._stamp = (_stamp_in(self._sample.attachment),)
+            self._stamp = (stamp_in(self._sample.attachment),)
         return self._stamp[0]
 
     @property
     def timestamp(self) -> tuple[int, str] | None:
-        """Zenoh's own timestamp: ns since 1970, and the session that made it, a router's if its sender made none."""
+        """Zenoh's own timestamp: ns since 1970, and the session that made it, a router's if its
+        sender made none.
+        """
         stamp = self._sample.timestamp
         return stamp and (stamp.get_time_as_ntp64().as_nanos(), str(stamp.get_id()))
 
     @property
     def number(self) -> tuple[str, int] | None:
-        """Its sender, and its number among those of the sender on this key; None without a stamp."""
+        """Its sender, and its number among those of the sender on this key; None without a
+        stamp.
+        """
         parts = _stamp_parts(self._sample.attachment)
         return (parts[0].decode(errors="replace"), int(parts[1])) if parts else None
 
@@ -218,14 +284,18 @@ class Declared:
         self.kept: set[Declared] = set()  # by the bus, with all that is declared
 
     def close(self) -> None:
-        """Remove the declarations: nothing more arrives, and others see it leave. Does nothing the second time."""
+        """Remove the declarations: nothing more arrives, and others see it leave. Does nothing the
+        second time.
+        """
         self.kept.discard(self)
         ends, self.ends = self.ends, []
         for end in reversed(ends):
             end.undeclare()
 
     def leave_to_parent(self, refuse: Callable[..., Any]) -> None:
-        """Let each use call `refuse`, in a process that was forked from the one that has declared this."""
+        """Let each use call `refuse`, in a process that was forked from the one that has declared
+        this.
+        """
 
     @contextlib.contextmanager
     def unless_closed(self) -> Iterator[None]:
@@ -239,7 +309,9 @@ class Declared:
 
 
 class Answers(Declared):
-    """Answers the queries of a queryable by `answer`, one after the other in a thread of its own, until `close`."""
+    """Answers the queries of a queryable by `answer`, one after the other in a thread of its own,
+    until `close`.
+    """
 
     def __init__(self, queryable: Any, answer: Callable[[Any], None]) -> None:
         super().__init__(queryable)
@@ -265,8 +337,8 @@ class Answers(Declared):
 
 
 class Ring:
-    """What came on one key of a Dealer, the newest `depth` of each priority; it stands for a ring channel of Zenoh and
-    its declaration.
+    """The newest `depth` samples or requests of each priority on one key of a Dealer. It has the
+    interface of Zenoh's ring channel, and of the declaration that fills it.
 
     A flood pushes nothing out that came on another key, or with a higher priority.
     """
@@ -278,7 +350,9 @@ class Ring:
     def append(self, one: Any, priority: int) -> None:
         """Add what came with a priority of Zenoh."""
         if priority not in self._waiting:
-            self._waiting = dict(sorted({**self._waiting, priority: deque(maxlen=self._depth)}.items()))
+            self._waiting = dict(
+                sorted({**self._waiting, priority: deque(maxlen=self._depth)}.items())
+            )
         self._waiting[priority].append(one)
 
     def try_recv(self) -> Any:
@@ -291,17 +365,20 @@ class Ring:
 
 
 class Dealer(Declared):
-    """Deals what comes on a key expression, such as `*/cmd_vel`, to the rings of its keys: of hundreds of robots, who
-    got something is known without asking each.
+    """Deals what comes on a key expression, such as `*/cmd_vel`, to the rings of its keys, so that
+    the reader need not poll every robot's queue.
 
-    `declared` is Zenoh's subscriber, or its queryable, whose requests for several keys are for none.
+    ready: The rings that got something, in order; the reader takes them out.
+
+    `declared` is Zenoh's subscriber, or its queryable; a request for several keys at once is dealt
+    to none.
     """
 
     def __init__(self, declared: Any, is_queryable: bool) -> None:
         super().__init__(declared)
         self._recv, self._is_queryable = declared.handler.try_recv, is_queryable
         self._rings: dict[str, Ring] = {}
-        self.ready: dict[Ring, None] = {}  # those that got something, in order; the reader takes them out
+        self.ready: dict[Ring, None] = {}
 
     def ring(self, key: str, depth: int) -> Ring:
         """A ring for a key, which takes the place of an earlier one."""
@@ -359,7 +436,9 @@ class RawSubscriber(Declared):
         return sample and Sample(sample, self.limit)
 
     def recv(self) -> Sample:
-        """The next sample; waits for it. Raises BusError once the bus or this subscriber is closed."""
+        """The next sample; waits for it. Raises BusError once the bus or this subscriber is
+        closed.
+        """
         return Sample(self.wait(), self.limit)
 
     def wait(self) -> Any:
@@ -370,13 +449,14 @@ class RawSubscriber(Declared):
             return self.channel.recv()
         except BusError:
             raise
-        except Exception:  # a ZError: the session is closed. Zenoh is imported later than this module
+        # a ZError: the session is closed. Zenoh is imported later than this module
+        except Exception:
             raise BusError("closed") from None
 
 
 class Replies:
-    """The replies to `Bus.ask` and `ask_all`, each a sample or the bytes of an error. With a `replier`, those of any
-    other session are skipped, by Zenoh's own id of the replier.
+    """The replies to `Bus.ask` and `ask_all`, each a sample or the bytes of an error. With a
+    `replier`, those of any other session are skipped, by Zenoh's own id of the replier.
     """
 
     def __init__(self, replies: Any, replier: str = "") -> None:
@@ -397,7 +477,9 @@ class Replies:
         return map(_read, filter(self._is_meant, self._replies))
 
     def _is_meant(self, reply: Any) -> bool:
-        return not self._replier or bool(reply.replier_id and str(reply.replier_id.zid) == self._replier)
+        return not self._replier or bool(
+            reply.replier_id and str(reply.replier_id.zid) == self._replier
+        )
 
 
 def _read(reply: Any) -> Sample | bytes:

@@ -6,21 +6,28 @@ import threading
 import time
 import zlib
 from array import array
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image as Jpeg
 
+from holozen import engines
 from holozen.bus import Bus, Publisher, Subscription
 from holozen.console import report
 from holozen.entities import description
 from holozen.messages import CameraInfo, CompressedImage, Exposure, Header, Image
 from holozen.messages.message import not_finite
-from holozen.robot.description import read
 from holozen.robot.errors import RobotError
-from holozen.robot.sensors import FIELD_OF_VIEW, MAX_PIXELS
+from holozen.robot.files.description import read
+from holozen.robot.files.sensors import FIELD_OF_VIEW, MAX_PIXELS
 from holozen.transport.errors import BusError, ServiceError
 
-from .renderer import Bytes, Floats, Renderer
+from .picture import Bytes, Floats
+from .rasterizer import Rasterizer
+from .watch import Watch
+
+if TYPE_CHECKING:
+    from .renderer import Renderer
 
 POLL = 0.005  # s between two looks for exposures
 QUALITY = 80  # of a JPEG, from 1 to 95; image_transport's default
@@ -29,21 +36,38 @@ ENCODINGS = ("rgb8", "mono8")
 REPORT_EVERY = 1.0  # s between two lines about exposures that cannot be rendered
 
 
+def renderer() -> "Renderer | Rasterizer":
+    """A renderer: pybullet's where that is installed."""
+    if not engines.is_installed(engines.PYBULLET):
+        return Rasterizer()
+    from .renderer import Renderer
+
+    return Renderer()
+
+
 class Studio:
-    """All cameras of a sim. Of the exposures that arrived while a picture was rendered, only each camera's newest is
-    rendered.
+    """All cameras of a sim. Of the exposures that arrived while a picture was rendered, only each
+    camera's newest is rendered, and none of those that `watch` has dropped.
     """
 
-    def __init__(self, bus: Bus, exposures: Subscription[Exposure]) -> None:
-        self._bus, self._exposures, self._renderer = bus, exposures, Renderer()
+    def __init__(
+        self, bus: Bus, exposures: Subscription[Exposure], watch: Watch | None = None
+    ) -> None:
+        self._bus, self._exposures, self._renderer = bus, exposures, renderer()
+        self._watch = watch or Watch()
         self._cameras: dict[str, Camera] = {}
-        self._requested: dict[int, float] = {}  # entities not described yet: when that was requested (s), by number
+        # entities not described yet: when that was requested (s), by number
+        self._requested: dict[int, float] = {}
         self._reported = -math.inf  # s
 
     def run(self, stop: threading.Event) -> None:
         """Render until `stop` is set."""
         while not stop.is_set():
-            waiting = [received.message for received in iter(self._exposures.try_recv, None) if received.message]
+            waiting = [
+                received.message
+                for received in iter(self._exposures.try_recv, None)
+                if received.message
+            ]
             newest = dict[str, Exposure]()
             for exposure in waiting:
                 name = exposure.image or exposure.depth
@@ -57,6 +81,8 @@ class Studio:
                 stop.wait(POLL)
 
     def _take(self, name: str, exposure: Exposure) -> None:
+        if name in self._watch.dropped:
+            return
         if reason := fault(exposure):
             return self._refuse(f"{name[:80]!r} cannot be rendered: {reason}")
         if name not in self._cameras:
@@ -65,10 +91,11 @@ class Studio:
             except BusError as error:
                 return self._refuse(str(error))
         camera = self._cameras[name]
-        if camera.wanted:
+        if camera.poll_wanted():
             self._renderer.renew()
             self._request_descriptions(exposure)
-            camera.publish(exposure, self._renderer)
+            with self._watch.picture(name):
+                camera.publish(exposure, self._renderer)
 
     def _refuse(self, reason: str) -> None:
         if (now := time.monotonic()) - self._reported >= REPORT_EVERY:
@@ -79,10 +106,15 @@ class Studio:
         """Request what new entities look like."""
         for entity in exposure.entities:
             asked = self._requested.get(entity.number, -math.inf)
-            if self._renderer.knows(entity.name, entity.number) or time.monotonic() - asked < PATIENCE:
+            if (
+                self._renderer.knows(entity.name, entity.number)
+                or time.monotonic() - asked < PATIENCE
+            ):
                 continue
             now = time.monotonic()
-            self._requested = {number: at for number, at in self._requested.items() if now - at < PATIENCE}
+            self._requested = {
+                number: at for number, at in self._requested.items() if now - at < PATIENCE
+            }
             self._requested[entity.number] = now
             try:
                 if found := description(self._bus, entity.name, entity.number, PATIENCE):
@@ -100,7 +132,10 @@ def fault(exposure: Exposure) -> str:
     if not (exposure.info and (exposure.image or exposure.depth)):
         return "it has no key for its picture or its CameraInfo"
     if not 0 < exposure.width * exposure.height <= MAX_PIXELS:
-        return f"it has {exposure.width} x {exposure.height} pixels; from 1 to {MAX_PIXELS} are rendered"
+        return (
+            f"it has {exposure.width} x {exposure.height} pixels; from 1 to {MAX_PIXELS} are "
+            "rendered"
+        )
     if not low <= exposure.field_of_view <= high:
         return f"its field of view is {exposure.field_of_view:g} rad; use {low:g} to {high:g}"
     if not 0 < exposure.near < exposure.far:
@@ -108,25 +143,38 @@ def fault(exposure: Exposure) -> str:
     if exposure.encoding not in ENCODINGS:
         return f"its encoding {exposure.encoding[:80]!r} is none of {', '.join(ENCODINGS)}"
     wrong = (one for one in exposure.entities if len(one.links) != len(one.poses))
-    return next((f"{one.name[:80]!r} has {len(one.links)} links and {len(one.poses)} poses" for one in wrong), "")
+    return next(
+        (
+            f"{one.name[:80]!r} has {len(one.links)} links and {len(one.poses)} poses"
+            for one in wrong
+        ),
+        "",
+    )
 
 
 class Camera:
-    """The publishers of a camera. Pictures are CDR whatever `--wire` says: in JSON one would take a second."""
+    """The publishers of a camera. Pictures are CDR whatever `--wire` says: in JSON one would take a
+    second.
+    """
 
     def __init__(self, bus: Bus, first: Exposure) -> None:
-        self._image: Publisher[Image] | None = bus.publisher(first.image, Image, wire="cdr") if first.image else None
-        self._compressed: Publisher[CompressedImage] | None = (
-            bus.publisher(f"{first.image}/compressed", CompressedImage, wire="cdr") if first.image else None
+        self._image: Publisher[Image] | None = (
+            bus.publisher(first.image, Image, wire="cdr") if first.image else None
         )
-        self._depth: Publisher[Image] | None = bus.publisher(first.depth, Image, wire="cdr") if first.depth else None
+        self._compressed: Publisher[CompressedImage] | None = (
+            bus.publisher(f"{first.image}/compressed", CompressedImage, wire="cdr")
+            if first.image
+            else None
+        )
+        self._depth: Publisher[Image] | None = (
+            bus.publisher(first.depth, Image, wire="cdr") if first.depth else None
+        )
         self._info: Publisher[CameraInfo] = bus.publisher(first.info, CameraInfo)
         self._all = [one for one in (self._image, self._compressed, self._depth, self._info) if one]
 
-    @property
-    def wanted(self) -> bool:
+    def poll_wanted(self) -> bool:
         """Whether anyone wants what `publish` sends."""
-        wanted = [one.wanted for one in self._all]
+        wanted = [one.poll_wanted() for one in self._all]
         return any(wanted)
 
     def close(self) -> None:
@@ -134,14 +182,14 @@ class Camera:
         for publisher in self._all:
             publisher.close()
 
-    def publish(self, exposure: Exposure, renderer: Renderer) -> None:
+    def publish(self, exposure: Exposure, renderer: "Renderer | Rasterizer") -> None:
         """Render and publish a picture."""
         if self._image or self._depth:
             colors, depth = renderer.render(exposure)
             if self._image and self._compressed:
                 picture = _image(exposure, _with_noise(exposure, colors))
                 self._image.put(picture)
-                if self._compressed.wanted:
+                if self._compressed.poll_wanted():
                     self._compressed.put(_compressed(picture))
             if self._depth:
                 self._depth.put(_image(exposure, depth))
@@ -172,9 +220,12 @@ def _compressed(picture: Image) -> CompressedImage:
     """The JPEG of a picture."""
     color = picture.encoding != "mono8"
     file = io.BytesIO()
-    pixels = Jpeg.frombytes("RGB" if color else "L", (picture.width, picture.height), bytes(picture.data))
+    pixels = Jpeg.frombytes(
+        "RGB" if color else "L", (picture.width, picture.height), bytes(picture.data)
+    )
     pixels.save(file, "JPEG", quality=QUALITY)
-    name = f"{picture.encoding}; jpeg compressed {'bgr8' if color else ''}"  # cv2 reads colours as bgr8
+    # cv2 reads colours as bgr8
+    name = f"{picture.encoding}; jpeg compressed {'bgr8' if color else ''}"
     return CompressedImage(picture.header, name, array("B", file.getvalue()))
 
 

@@ -24,7 +24,9 @@ from .goto import Gains, Leg
 
 
 class Param(NamedTuple):
-    """A gain, as a flag and as a parameter that can be set while it drives. `field` is its name in Gains."""
+    """A gain, as a flag and as a parameter that can be set while it drives. `field` is its name in
+    Gains.
+    """
 
     name: str
     field: str
@@ -58,10 +60,25 @@ def parser() -> argparse.ArgumentParser:
         epilog="example: holozen controller --laps 0",
     )
     add = parser.add_argument
-    add("robot", nargs="?", default="", type=flags.robot, help="the robot's name; default: the robot without a name")
+    add(
+        "robot",
+        nargs="?",
+        default="",
+        type=flags.robot,
+        help="the robot's name; default: the robot without a name",
+    )
     add("--resume", action="store_true", help="let the controller drive again, and exit")
-    add("--held", action="store_true", help="drive only after `holozen controller --resume` or the teleop's r")
-    add("--laps", type=flags.count(), default=1, help="number of laps around the goals; 0: for ever (default: 1)")
+    add(
+        "--held",
+        action="store_true",
+        help="drive only after `holozen controller --resume` or the teleop's r",
+    )
+    add(
+        "--laps",
+        type=flags.count(),
+        default=1,
+        help="number of laps around the goals; 0: for ever (default: 1)",
+    )
     for param in PARAMS:
         add(
             param.flag,
@@ -69,7 +86,8 @@ def parser() -> argparse.ArgumentParser:
             default=getattr(default, param.field),
             help=f"{param.about}, {param.unit} (default: %(default)g)",
         )
-    connection.add_arguments(parser)
+    flags.add_json(parser)
+    connection.add_arguments(parser, role="autopilot")
     return parser
 
 
@@ -87,7 +105,14 @@ def follow(args: argparse.Namespace, where: connection.Connection) -> int:
     """Drive `args.laps` laps (0: for ever), and print the legs of each."""
     stop, laps = stop_event(), 0
     with Bus("controller", where, lasting=True, stop=stop) as bus:
-        follower = Follower(bus, args.robot, _gains(args), stop, lambda text: report(f"controller: {text}"), args.held)
+        follower = Follower(
+            bus,
+            args.robot,
+            _gains(args),
+            stop,
+            lambda text: report(f"controller: {text}"),
+            args.held,
+        )
         Parameters(bus, key_for("controller", args.robot), lambda: declared(follower)).start()
         warn_of_twin(bus, key_for("controller", args.robot))
         try:
@@ -103,9 +128,14 @@ def declared(follower: Follower) -> Iterator[Number]:
     """The follower's gains as parameters; changes apply from the next command on."""
     for param in PARAMS:
         yield Number(
-            param.name, param.about, param.unit, param.low, param.high,
-            partial(_get, follower, param.field), partial(_set, follower, param.field),
-        )  # fmt: skip
+            param.name,
+            param.about,
+            param.unit,
+            param.low,
+            param.high,
+            partial(_get, follower, param.field),
+            partial(_set, follower, param.field),
+        )
 
 
 def _get(follower: Follower, field: str) -> float:

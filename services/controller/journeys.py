@@ -1,4 +1,6 @@
-"""Where the controller is sent: by goal_pose, or by the actions navigate_to_pose and follow_waypoints."""
+"""Where the controller is sent: by goal_pose, or by the actions navigate_to_pose and
+follow_waypoints.
+"""
 
 import math
 import threading
@@ -14,19 +16,20 @@ from holozen.messages.builtin_interfaces import Duration
 from holozen.transport.actions import ActionServer, Goal, State
 from holozen.wire import key_for
 
-from .goto import Leg, Pose
+from .goto import Leg, PlanarPose
 
 FEEDBACK_EVERY = 0.2  # s of the odom's clock
-MAX_AGE = 2.0  # s of a goal when it is accepted; an older one waited in a link, and what happened since is unknown
+# s of a goal when it is accepted; an older one waited in a link, and what happened since is unknown
+MAX_AGE = 2.0
 MAX_POSES = 10_000  # of one goal, all loops included
 
 
 class Journey:
-    """Poses to visit, in order, and the key that they came on (`origin`). This class is for goal_pose, of which no
-    client awaits the end.
+    """Poses to visit, in order, and the key that they came on (`origin`). This class is for
+    goal_pose, of which no client awaits the end.
     """
 
-    def __init__(self, origin: str, poses: Sequence[Pose]) -> None:
+    def __init__(self, origin: str, poses: Sequence[PlanarPose]) -> None:
         self.origin, self.left = origin, deque(poses)
 
     @property
@@ -42,21 +45,27 @@ class Journey:
         self.left.popleft()
 
     def give_up(self, reason: str) -> bool:
-        """Called when the robot cannot go on. Returns whether that ends the journey; else it waits."""
+        """Called when the robot cannot go on. Returns whether that ends the journey; else it
+        waits.
+        """
         return False
 
     def end(self) -> None:
-        """Called when the robot rests at the last pose, or where it stopped since the client cancelled."""
+        """Called when the robot rests at the last pose, or where it stopped since the client
+        cancelled.
+        """
 
 
 class GoalJourney(Journey):
     """The journey of an action's goal. Its end is published once, whatever its cause."""
 
-    def __init__(self, origin: str, server: ActionServer, goal: Goal, poses: Sequence[PoseStamped], kind: Any) -> None:
+    def __init__(
+        self, origin: str, server: ActionServer, goal: Goal, poses: Sequence[PoseStamped], kind: Any
+    ) -> None:
         super().__init__(origin, [one.pose.planar() for one in poses])
         self._server, self._goal, self._stamped, self._kind = server, goal, poses, kind
         self._began: float | None = None  # s, of the odom's clock
-        self._reported = -math.inf
+        self._reported: float | None = None  # s, of the odom's clock; the last feedback
 
     @property
     def is_canceled(self) -> bool:
@@ -73,7 +82,7 @@ class GoalJourney(Journey):
         """Publish the progress, every FEEDBACK_EVERY seconds."""
         if self._began is None:
             self._began = leg.began
-        if leg.ended - self._reported < FEEDBACK_EVERY:
+        if self._reported is not None and leg.ended - self._reported < FEEDBACK_EVERY:
             return
         self._reported = leg.ended
         self._server.feedback(self._goal, self._progress(leg, odom, speed))
@@ -84,12 +93,16 @@ class GoalJourney(Journey):
         x, y, _ = odom.pose.pose.planar()
         distance = math.hypot(leg.goal[0] - x, leg.goal[1] - y)
         return nav.NavigateToPoseFeedback(
-            PoseStamped(odom.header, odom.pose.pose), Duration.of(leg.ended - (self._began or 0.0)),
-            Duration.of(distance / speed), distance_remaining=distance,
-        )  # fmt: skip
+            PoseStamped(odom.header, odom.pose.pose),
+            Duration.of(leg.ended - (self._began or 0.0)),
+            Duration.of(distance / speed),
+            distance_remaining=distance,
+        )
 
     def _index(self, ahead: int) -> int:
-        """The index, in the goal's list, of the waypoint that is `ahead` of the next one by that many."""
+        """The index, in the goal's list, of the waypoint that is `ahead` of the next one by that
+        many.
+        """
         done = len(self._stamped) - len(self.left)
         return int((self._goal.request.goal_index + done + ahead) % len(self._goal.request.poses))
 
@@ -115,15 +128,24 @@ class GoalJourney(Journey):
         if self._kind is nav.NavigateToPose:
             return nav.NavigateToPoseResult(unknown, reason)
         done = len(self._stamped) - len(self.left)
-        missed = [nav.MissedWaypoint(self._index(number), goal) for number, goal in enumerate(self._stamped[done:])]
+        missed = [
+            nav.MissedWaypoint(self._index(number), goal)
+            for number, goal in enumerate(self._stamped[done:])
+        ]
         return nav.FollowWaypointsResult(missed, unknown, reason)
 
 
 class GoalServers:
-    """Serves both actions, each in a thread of its own. `refusal` returns why a pose is refused, or ""."""
+    """Serves both actions, each in a thread of its own. `refusal` returns why a pose is refused, or
+    "".
+    """
 
     def __init__(
-        self, bus: Bus, robot: str, refusal: Callable[[PoseStamped], str], report: Callable[[str], None]
+        self,
+        bus: Bus,
+        robot: str,
+        refusal: Callable[[PoseStamped], str],
+        report: Callable[[str], None],
     ) -> None:
         self._refusal, self._report = refusal, report
         self._lock = threading.Lock()
@@ -134,7 +156,9 @@ class GoalServers:
             ("follow_waypoints", nav.FollowWaypoints, _looped),
         ):
             begin = partial(self._begin, name, kind, poses)
-            ActionServer(bus, key_for(name, robot), kind, partial(self._refuses, poses), begin, MAX_AGE).start()
+            ActionServer(
+                bus, key_for(name, robot), kind, partial(self._refuses, poses), begin, MAX_AGE
+            ).start()
 
     def take(self) -> GoalJourney | None:
         """The newest accepted goal, which is returned only once; else None."""
@@ -178,12 +202,16 @@ def _one(goal: Any) -> Sequence[PoseStamped]:
 
 
 def _looped(goal: Any) -> Sequence[PoseStamped]:
-    """The poses from goal_index on, then all of them once for each further loop. Raises ValueError."""
+    """The poses from goal_index on, then all of them once for each further loop. Raises
+    ValueError.
+    """
     count = len(goal.poses)
     if not count:
         raise ValueError("it has no poses")
     if goal.goal_index >= count:
         raise ValueError(f"goal_index is {goal.goal_index}; use 0 to {count - 1}")
     if count * (goal.number_of_loops + 1) > MAX_POSES:
-        raise ValueError(f"{count} poses in {goal.number_of_loops + 1} rounds; at most {MAX_POSES} in all")
+        raise ValueError(
+            f"{count} poses in {goal.number_of_loops + 1} rounds; at most {MAX_POSES} in all"
+        )
     return [*goal.poses[goal.goal_index :], *list(goal.poses) * goal.number_of_loops]

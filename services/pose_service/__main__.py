@@ -9,7 +9,7 @@ from pathlib import Path
 
 from holozen.bus import Bus
 from holozen.console import report
-from holozen.flags import Parser, number
+from holozen.flags import Parser, add_json, number
 from holozen.messages import GetPoseReply, GetPoseRequest, NextGoalReply, NextGoalRequest, Odometry
 from holozen.process import stop_event, wait_for_end
 from holozen.transport import connection
@@ -28,7 +28,9 @@ MAX_ODOM_BYTES = 65_536  # larger payloads are not read
 
 
 def next_goal(goals: list[Goal], request: NextGoalRequest) -> NextGoalReply:
-    """The goal with the requested number, counted from 0. Raises ServiceError if the list has no such goal."""
+    """The goal with the requested number, counted from 0. Raises ServiceError if the list has no
+    such goal.
+    """
     number = request.request_goal
     if not 0 <= number < len(goals):
         raise ServiceError(f"goal {number}: the list holds goals 0 to {len(goals) - 1}")
@@ -37,7 +39,9 @@ def next_goal(goals: list[Goal], request: NextGoalRequest) -> NextGoalReply:
 
 
 class Route:
-    """The goals of a `file`, or else of a `shape` of `size` metres. Raises GoalsError for a file that is wrong."""
+    """The goals of a `file`, or else of a `shape` of `size` metres. Raises GoalsError for a file
+    that is wrong.
+    """
 
     def __init__(self, shape: str, size: float, file: Path | None = None) -> None:
         self._shape, self._size, self._file = shape, size, file
@@ -50,13 +54,20 @@ class Route:
             yield Choice("goals", "the file of the goals", (), lambda: file)
             return
         yield Choice(
-            "shape", "the shape of the goals, from the next request on", tuple(SHAPES), lambda: self._shape,
+            "shape",
+            "the shape of the goals, from the next request on",
+            tuple(SHAPES),
+            lambda: self._shape,
             lambda shape: self._draw(shape, self._size),
-        )  # fmt: skip
+        )
         yield Number(
-            "size", "side length (for infinity: half its length)", "m", *SIZES, lambda: self._size,
+            "size",
+            "side length (for infinity: half its length)",
+            "m",
+            *SIZES,
+            lambda: self._size,
             lambda size: self._draw(self._shape, size),
-        )  # fmt: skip
+        )
 
     def _draw(self, shape: str, size: float) -> None:
         self._shape, self._size, self.goals = shape, size, SHAPES[shape](size)
@@ -72,7 +83,9 @@ class Tracker:
         threading.Thread(target=self._receive, daemon=True).start()
 
     def get_pose(self, request: GetPoseRequest) -> GetPoseReply:
-        """The last odom of a robot. Raises ServiceError for an invalid name, without odom, and if it is stale."""
+        """The last odom of a robot. Raises ServiceError for an invalid name, without odom, and if
+        it is stale.
+        """
         try:
             key = key_for("odom", robot_name(request.name) if request.name else "")
         except ValueError as error:
@@ -80,16 +93,22 @@ class Tracker:
         with self._lock:
             arrivals = self._last.get(key)
             if arrivals is None or arrivals.newest is None:
-                raise ServiceError(f"no {key} was received; robots with odom: {self._names() or 'none'}")
+                raise ServiceError(
+                    f"no {key} was received; robots with odom: {self._names() or 'none'}"
+                )
             age = arrivals.age(time.monotonic())
             if age > arrivals.patience(ODOM_SILENCE):
-                raise ServiceError(f"{key} is stale: the last one came {age:.1f} s ago; is the sim running?")
+                raise ServiceError(
+                    f"{key} is stale: the last one came {age:.1f} s ago; is the sim running?"
+                )
             return GetPoseReply(arrivals.newest, age)
 
     def _names(self) -> str:
         """The names of the robots with the most recent odom."""
         recent = list(self._last)[-MAX_NAMES:]
-        return ", ".join(sorted(key.removesuffix("odom").rstrip("/") or "'' (at the root)" for key in recent))
+        return ", ".join(
+            sorted(key.removesuffix("odom").rstrip("/") or "'' (at the root)" for key in recent)
+        )
 
     def _receive(self) -> None:
         for received in until_closed(self._odoms.recv):
@@ -113,10 +132,20 @@ def parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("--shape", choices=SHAPES, default="square", help="the goals' shape (default: square)")
-    add("--size", type=number(*SIZES, "m"), default=1.0,
-        help="side length of the shape in metres (for infinity: half its length; default: 1)")  # fmt: skip
-    add("--goals", type=Path, metavar="FILE", help="read goals from a file instead, one x y theta per line")
-    connection.add_arguments(parser)
+    add(
+        "--size",
+        type=number(*SIZES, "m"),
+        default=1.0,
+        help="side length of the shape in metres (for infinity: half its length; default: 1)",
+    )
+    add(
+        "--goals",
+        type=Path,
+        metavar="FILE",
+        help="read goals from a file instead, one x y theta per line",
+    )
+    add_json(parser)
+    connection.add_arguments(parser, role="autopilot")
     return parser
 
 
@@ -128,7 +157,12 @@ def main(argv: list[str] | None = None) -> int:
         with Bus("pose_service", connection.from_arguments(args), lasting=True, stop=stop) as bus:
             tracker = Tracker(bus.subscribe("**/odom", Odometry, depth=256, limit=MAX_ODOM_BYTES))
             bus.serve("get_pose", GetPoseRequest, GetPoseReply, tracker.get_pose).start()
-            bus.serve("next_goal", NextGoalRequest, NextGoalReply, lambda asked: next_goal(route.goals, asked)).start()
+            bus.serve(
+                "next_goal",
+                NextGoalRequest,
+                NextGoalReply,
+                lambda asked: next_goal(route.goals, asked),
+            ).start()
             Parameters(bus, "pose_service", route.declared).start()
             warn_of_twin(bus, "pose_service")
             report(f"pose_service: {len(route.goals)} goals from {args.goals or args.shape}")

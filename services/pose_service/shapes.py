@@ -1,4 +1,6 @@
-"""Shapes as lists of goals: x, y in metres, theta in radians, odom frame. Each begins and ends at the origin."""
+"""Shapes as lists of goals: x, y in metres, theta in radians, odom frame. Each begins and ends at
+the origin.
+"""
 
 import math
 from collections.abc import Callable
@@ -64,8 +66,8 @@ def _tour(corners: list[Point]) -> list[Goal]:
 
 
 def read_goals(path: Path) -> list[Goal]:
-    """The goals in a text file, an `x y theta` on each line: commas count as spaces, theta is optional, and # begins a
-    comment. Raises GoalsError.
+    """The goals in a text file, an `x y theta` on each line: commas count as spaces, theta is
+    optional, and # begins a comment. Raises GoalsError.
     """
     try:
         with path.open() as file:
@@ -77,7 +79,9 @@ def read_goals(path: Path) -> list[Goal]:
     if len(text) > MAX_TEXT:
         raise GoalsError(f"goals {path}: more than {MAX_TEXT:,} characters; give a shorter file")
     lines = text.splitlines()
-    goals = [_goal(line, f"{path}:{number}") for number, line in enumerate(lines, 1) if _content(line)]
+    goals = [
+        _goal(line, f"{path}:{number}") for number, line in enumerate(lines, 1) if _content(line)
+    ]
     if not goals:
         raise GoalsError(f"goals {path}: no goals; write one x y theta per line")
     return goals
@@ -93,5 +97,8 @@ def _goal(line: str, where: str) -> Goal:
     except ValueError:
         values = []
     if len(values) not in (2, 3) or not all(abs(value) <= MAX_VALUE for value in values):
-        raise GoalsError(f"goals {where}: {line.strip()!r}; write x y theta in metres and radians, such as 1.0 0 1.57")
+        raise GoalsError(
+            f"goals {where}: {line.strip()!r}; write x y theta in metres and radians, such as 1.0 "
+            "0 1.57"
+        )
     return values[0], values[1], values[2] if len(values) == 3 else 0.0

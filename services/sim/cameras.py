@@ -1,4 +1,6 @@
-"""The process that renders what the cameras of a sim see, and the exposures that the sim sends to it."""
+"""The process that renders what the cameras of a sim see, and the exposures that the sim sends to
+it.
+"""
 
 import shlex
 import subprocess
@@ -13,8 +15,8 @@ GRACE = 1.0  # s for it to end
 
 
 class Cameras:
-    """The cameras of a sim. `key` is that of its exposures, which no other sim has; `where` are the connection flags
-    with which the process is started.
+    """The cameras of a sim. `key` is that of its exposures, which no other sim has; `where` are the
+    connection flags with which the process is started.
     """
 
     def __init__(self, bus: Bus, key: str, where: list[str]) -> None:
@@ -34,14 +36,15 @@ class Cameras:
                 preexec_fn=dies_with_parent(),
             )
 
-    @property
-    def wanted(self) -> bool:
-        """Whether exposures are read. Reports once if the process has ended."""
+    def poll_wanted(self) -> bool:
+        """Look whether exposures are read. Reports once if the process has ended."""
         if self._process and (code := self._process.poll()) is not None:
             self._process = None
             again = f"`{shlex.join(['holozen', *self._words])}` starts it again"
-            report(f"sim: the camera ended with exit code {code}, so there are no pictures; {again}")
-        return self._publisher is not None and self._publisher.wanted
+            report(
+                f"sim: the camera ended with exit code {code}, so there are no pictures; {again}"
+            )
+        return self._publisher is not None and self._publisher.poll_wanted()
 
     def expose(self, exposure: Exposure) -> None:
         """Send an exposure to be rendered."""

@@ -1,4 +1,6 @@
-"""The poses and velocities of a robot's links, from those of its root and its joints. No engine, no clock."""
+"""The poses and velocities of a robot's links, from those of its root and its joints. No engine, no
+clock.
+"""
 
 from collections.abc import Mapping
 from functools import lru_cache
@@ -22,12 +24,18 @@ class LinkState(NamedTuple):
         """The state of a frame that is fixed in this one, at a position (m) and rotation."""
         (x, y, z), (a, b, c) = self.xyz, rotate(self.rotation, xyz)
         along = velocity_at((a, b, c), self.linear, self.angular)
-        return LinkState((x + a, y + b, z + c), multiply(self.rotation, rotation), along, self.angular)
+        return LinkState(
+            (x + a, y + b, z + c), multiply(self.rotation, rotation), along, self.angular
+        )
+
+
+LinkStates = Mapping[str, LinkState]
+"""The states of a robot's links, by name."""
 
 
 class LinkTree:
-    """The links of a model. `joints` has each joint, every parent before its children, with its position (m) and
-    rotation in the parent link.
+    """The links of a model. `joints` has each joint, every parent before its children, with its
+    position (m) and rotation in the parent link.
     """
 
     def __init__(self, model: RobotModel) -> None:
@@ -37,12 +45,14 @@ class LinkTree:
     def states(
         self, root: LinkState, positions: Mapping[str, float] = {}, rates: Mapping[str, float] = {}
     ) -> dict[str, LinkState]:
-        """The states of all links, from that of the root and the joints' positions (rad or m) and rates (rad/s or m/s).
-        A joint that is not given stands at zero.
+        """The states of all links, from that of the root and the joints' positions (rad or m) and
+        rates (rad/s or m/s). A joint that is not given stands at zero.
         """
         found = {self._root: root}
         for joint, xyz, rotation in self.joints:
-            at = found[joint.parent].at(*moved_by(joint, xyz, rotation, positions.get(joint.name, 0.0)))
+            at = found[joint.parent].at(
+                *moved_by(joint, xyz, rotation, positions.get(joint.name, 0.0))
+            )
             if rate := rates.get(joint.name, 0.0):
                 axis = rotate(at.rotation, joint.axis)
                 if joint.kind == "prismatic":

@@ -1,7 +1,8 @@
-"""Shards: several sims on one bus that share the robots by name, each on a core or a machine of its own.
+"""Shards: several sims on one bus that share the robots by name, each on a core or a machine of its
+own.
 
-A hash of its name assigns each robot to one shard, so that two shards never have the same name. A shard is a node with
-a name such as `sim_2_of_3`.
+A hash of its name assigns each robot to one shard, so that two shards never have the same name. A
+shard is a node with a name such as `sim_2_of_3`.
 """
 
 import argparse
@@ -55,7 +56,9 @@ def shard(text: str) -> Shard:
     if (number != "auto" and not number.isdecimal()) or not count.isdecimal():
         raise refused(f"{text!r} is no shard; give K/N, such as 1/3, or auto/3 for any free number")
     made = Shard(AUTO if number == "auto" else int(number), int(count))
-    if not 1 <= made.count <= MAX_SHARDS or not (number == "auto" or 1 <= made.number <= made.count):
+    if not 1 <= made.count <= MAX_SHARDS or not (
+        number == "auto" or 1 <= made.number <= made.count
+    ):
         raise refused(f"{text!r}: give K/N with K from 1 to N and N up to {MAX_SHARDS}")
     return made
 
@@ -74,8 +77,12 @@ def is_shard(node: str) -> bool:
     return bool(_NODE.fullmatch(node))
 
 
-def claim(wanted: Shard, connection: Connection, open_bus: Callable[[str], Bus]) -> tuple[Shard, Bus]:
-    """Take a number, and open the bus as the node of that shard. Raises BusError if it is taken, or none is free."""
+def claim(
+    wanted: Shard, connection: Connection, open_bus: Callable[[str], Bus]
+) -> tuple[Shard, Bus]:
+    """Take a number, and open the bus as the node of that shard. Raises BusError if it is taken, or
+    none is free.
+    """
     for _ in range(TRIES):
         with Node("sim", connection) as node:
             mine = _free(wanted, shards_of(node.endpoints()))
@@ -89,17 +96,26 @@ def claim(wanted: Shard, connection: Connection, open_bus: Callable[[str], Bus])
             return mine, bus
         bus.close()
         if wanted.number != AUTO:
-            raise BusError(f"shard {mine} runs already ({min(rivals)[:6]}); take another: --shard auto/{mine.count}")
-    raise BusError(f"no free shard of {wanted.count} was found in {TRIES} tries; start this one again")
+            raise BusError(
+                f"shard {mine} runs already ({min(rivals)[:6]}); take another: --shard "
+                f"auto/{mine.count}"
+            )
+    raise BusError(
+        f"no free shard of {wanted.count} was found in {TRIES} tries; start this one again"
+    )
 
 
 def _free(wanted: Shard, running: Collection[Shard]) -> Shard:
     if other := next((one for one in running if one.count != wanted.count), None):
-        raise BusError(f"shard {other} runs here: all shards have the same N; use --shard auto/{other.count}")
+        raise BusError(
+            f"shard {other} runs here: all shards have the same N; use --shard auto/{other.count}"
+        )
     if wanted.number == AUTO:
         free = (Shard(number, wanted.count) for number in range(1, wanted.count + 1))
         if not (mine := next((one for one in free if one not in running), None)):
-            raise BusError(f"all {wanted.count} shards run already; end them all before you start more of them")
+            raise BusError(
+                f"all {wanted.count} shards run already; end them all before you start more of them"
+            )
         return mine
     if wanted in running:
         raise BusError(f"shard {wanted} runs already; take another: --shard auto/{wanted.count}")
@@ -116,8 +132,8 @@ class Share:
         self._scanned = -SCAN
 
     def refusal(self, name: str) -> str:
-        """Why no running shard has the entity with a name; empty if it belongs to this one. Raises Elsewhere if it
-        belongs to another one that runs.
+        """Why no running shard has the entity with a name; empty if it belongs to this one. Raises
+        Elsewhere if it belongs to another one that runs.
         """
         owner = self.mine.owner(name)
         if owner == self.mine:
@@ -126,10 +142,17 @@ class Share:
             self._running, self._scanned = shards_of(self._graph.endpoints()), now
         if owner in self._running:
             raise Elsewhere
-        return f"{name[:80]!r} belongs to shard {owner}, which does not run; start it: holozen sim --shard {owner}"
+        return (
+            f"{name[:80]!r} belongs to shard {owner}, which does not run; start it: holozen "
+            f"sim --shard {owner}"
+        )
 
 
 def add_argument(parser: argparse.ArgumentParser) -> None:
     """Add the flag `--shard`."""
-    parser.add_argument("--shard", type=shard, metavar="K/N",
-        help="be the K-th of N sims that share the robots by name; auto/N: any that is free")  # fmt: skip
+    parser.add_argument(
+        "--shard",
+        type=shard,
+        metavar="K/N",
+        help="be the K-th of N sims that share the robots by name; auto/N: any that is free",
+    )

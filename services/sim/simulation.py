@@ -6,12 +6,17 @@ from holozen.console import report
 from holozen.messages import simulation_interfaces as si
 from holozen.messages.simulation_interfaces import SimulationState as State
 
-from .entities import Entities, EntityError
+from .entities import Entities
+from .errors import EntityError
 from .physics.world import World
 from .schedule import Pace
 
 MAX_STEPS = 10_000_000  # of one request
-NAMES = {State.STATE_STOPPED: "stopped", State.STATE_PLAYING: "playing", State.STATE_PAUSED: "paused"}
+NAMES = {
+    State.STATE_STOPPED: "stopped",
+    State.STATE_PLAYING: "playing",
+    State.STATE_PAUSED: "paused",
+}
 ALL = si.ResetSimulationRequest.SCOPE_ALL
 TIME, STATE, SPAWNED = (
     si.ResetSimulationRequest.SCOPE_TIME,
@@ -21,7 +26,9 @@ TIME, STATE, SPAWNED = (
 
 
 class Steps:
-    """Steps to make while the sim is paused. `done` is called at their end, with the reason if that is early."""
+    """Steps to make while the sim is paused. `done` is called at their end, with the reason if that
+    is early.
+    """
 
     def __init__(self, left: int, done: Callable[[str], None]) -> None:
         self.left, self.done = left, done
@@ -29,9 +36,13 @@ class Steps:
 
 
 class Simulation:
-    """The state of a sim. `publish` is called on each change, so that readers know it before it is confirmed."""
+    """The state of a sim. `publish` is called on each change, so that readers know it before it is
+    confirmed.
+    """
 
-    def __init__(self, world: World, entities: Entities, pace: Pace, publish: Callable[[], None]) -> None:
+    def __init__(
+        self, world: World, entities: Entities, pace: Pace, publish: Callable[[], None]
+    ) -> None:
         self._world, self._entities, self._pace, self._publish = world, entities, pace, publish
         self.state = State.STATE_PLAYING
         self.epoch = 0  # resets so far
@@ -43,12 +54,12 @@ class Simulation:
         return self.state != State.STATE_PLAYING
 
     def play(self, now: float) -> None:
-        """Play from `now` (s) on. Earlier commands no longer count, unless the robot's watchdog is off."""
+        """Play from `now` (s) on. Earlier commands no longer count, unless the robot's watchdog is
+        off.
+        """
         self.end_steps("it plays")
         self.state = State.STATE_PLAYING
-        self._entities.command_time.play(now)
-        for robot in self._entities.robots:
-            robot.drop_commands(without_watchdog=False)
+        self._entities.fleet.play(now)
         self._pace.set_factor(self._pace.rtf, now)
         self._publish()
 
@@ -65,10 +76,7 @@ class Simulation:
 
     def _pause(self, now: float, state: int) -> None:
         self.state = state
-        self._entities.command_time.pause(now)
-        for robot in self._entities.robots:
-            for arbiter in robot.memory:
-                arbiter.invalidate()
+        self._entities.fleet.pause(now)
 
     def step(self, count: int, done: Callable[[str], None]) -> None:
         """Make `count` steps, and then call `done`. Raises EntityError."""
@@ -81,7 +89,7 @@ class Simulation:
 
     def stepped(self) -> None:
         """Count a step; after the last one, publish the state of everything and confirm."""
-        self._entities.command_time.step(self._world.spec.step)
+        self._entities.fleet.rules.time.step(self._world.spec.step)
         if self.steps:
             self.steps.left -= 1
             if not self.steps.left:
@@ -95,9 +103,14 @@ class Simulation:
             steps.done(reason and f"{reason}, {steps.left} steps before the last one")
 
     def reset(self, scope: int, now: float) -> None:
-        """Reset what `scope` names, at `now` (s). Nothing moves until it is commanded again. Raises EntityError."""
+        """Reset what `scope` names, at `now` (s). Nothing moves until it is commanded again. Raises
+        EntityError.
+        """
         if scope not in (*range(8), ALL):
-            problem = f"scope is {scope}; use 0 or 255 (all), or a sum of 1 (time), 2 (state), 4 (spawned)"
+            problem = (
+                f"scope is {scope}; use 0 or 255 (all), or a sum of 1 (time), 2 (state), 4 "
+                "(spawned)"
+            )
             raise EntityError(si.Result.FEATURE_UNSUPPORTED, problem)
         self.end_steps("it was reset")
         scope = scope or ALL
@@ -107,8 +120,7 @@ class Simulation:
             self._entities.rebuild(from_start=bool(scope & SPAWNED))
         if scope & TIME:
             self._world.rewind()
-        for robot in self._entities.robots:
-            robot.reset()
+        self._entities.fleet.reset()
         self.epoch += 1
         self._pace.set_factor(self._pace.rtf, now)
         report(f"sim: it was reset; epoch {self.epoch} begins")

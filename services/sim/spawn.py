@@ -4,19 +4,22 @@ import argparse
 import math
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from holozen import data
 from holozen.console import report
 from holozen.entities import has_no_room
 from holozen.robot.errors import RobotError
+from holozen.robot.files.loading import load
 from holozen.robot.keys import command_key
-from holozen.robot.loading import load
-from holozen.robot.model import Pushed, RobotModel, driven, takes
-from holozen.robot.rigid import PlacedShape, lowest, lump
+from holozen.robot.model import Camera, Pushed, RobotModel, Sensor, driven, takes
+from holozen.robot.rigid import PlacedShape, advised_drive, lowest, lump
 from holozen.rotation import from_rpy
 from holozen.suggest import listed
 from holozen.wire import key_for
 
-from .entities import Entities, EntityError
+from .entities import Entities
+from .errors import EntityError
 from .physics.engine import UPRIGHT
 from .shard import Shard
 
@@ -24,29 +27,58 @@ GAP = 0.5  # m between two robots at the start
 
 
 def add_models(entities: Entities, models: tuple[RobotModel, ...]) -> None:
-    """Add the models of the world file at their poses. Raises RobotError."""
+    """Add the models of the world file at their poses. One that cannot be added is left out, with a
+    line that says why.
+
+    The sensors of one without a drive, such as a camera above an arena, are at the root, as in
+    Gazebo, unless another model has their keys.
+    """
     for model in models:
-        rotation = from_rpy(*model.pose.rpy)
+        place = model.pose.xyz, from_rpy(*model.pose.rpy)
+        name = entities.free_name(_valid_name(model.name))
         try:
-            entities.add(
-                entities.free_name(_valid_name(model.name)), model, (model.pose.xyz, rotation), may_overlap=True
-            )
+            try:
+                entities.add(
+                    name, model if model.drive else _at_root(model), place, may_overlap=True
+                )
+            except EntityError:
+                entities.add(name, model, place, may_overlap=True)
         except EntityError as error:
-            raise RobotError(f"model {model.name!r} of the world: {error}") from None
+            report(f"sim: warning: the model {model.name!r} of the world is left out: {error}")
+
+
+def _at_root(model: RobotModel) -> RobotModel:
+    """The model, with the keys of its sensors at the root."""
+    return replace(model, sensors=tuple(map(_sensor_at_root, model.sensors)))
+
+
+def _sensor_at_root(sensor: Sensor) -> Sensor:
+    camera = sensor.device
+    if isinstance(camera, Camera):
+        keys = {
+            name: f"/{key}" for name in ("image", "info", "depth") if (key := getattr(camera, name))
+        }
+        camera = replace(camera, **keys)
+    return replace(sensor, topic=f"/{sensor.topic}", device=camera)
 
 
 def spawn_all(entities: Entities, args: argparse.Namespace, mine: Shard | None = None) -> list[str]:
-    """Add the robots of `--robot` on the ground, side by side along y, the first one at the origin; in a shard only
-    those that belong to it. Returns on which keys each listens, as text for people. Raises RobotError.
+    """Add the robots of `--robot` on the ground, side by side along y, the first one at the origin;
+    in a shard only those that belong to it. Returns on which keys each listens, as text for people.
+    Raises RobotError.
     """
     robots: list[tuple[Path, str]] = args.robot or [(data.find("urdf", "hb_bot.urdf.xacro"), "")]
     read = {path: _read(path, args) for path in dict.fromkeys(path for path, _ in robots)}
     models = [read[path] for path, _ in robots]
     # Robots without names may be told apart by the namespaces in their files.
-    names = [(name, command_key(model, name)) for model, (_, name) in zip(models, robots, strict=True)]
+    names = [
+        (name, command_key(model, name)) for model, (_, name) in zip(models, robots, strict=True)
+    ]
     for name, key in names:
         if (same := names.count((name, key))) > 1:
-            raise RobotError(f"{same} robots are called {name!r}; give each a name: --robot FILE=NAME")
+            raise RobotError(
+                f"{same} robots are called {name!r}; give each a name: --robot FILE=NAME"
+            )
     added, y = list[str](), 0.0
     for number, (model, (path, name)) in enumerate(zip(models, robots, strict=True)):
         reach = max(map(_reach, lump(model).collisions), default=0.0)
@@ -60,7 +92,10 @@ def spawn_all(entities: Entities, args: argparse.Namespace, mine: Shard | None =
 def _add(entities: Entities, path: Path, name: str, model: RobotModel, y: float) -> str:
     try:
         entity = entities.add(
-            name or entities.free_name(_valid_name(model.name)), model, ((0.0, y, -lowest(model)), UPRIGHT), name
+            name or entities.free_name(_valid_name(model.name)),
+            model,
+            ((0.0, y, -lowest(model)), UPRIGHT),
+            name,
         )
     except EntityError as error:
         advice = "; start with --empty, and `holozen spawn` it there" if has_no_room(error) else ""
@@ -68,11 +103,19 @@ def _add(entities: Entities, path: Path, name: str, model: RobotModel, y: float)
     drive = model.drive
     assert drive is not None, "_read refuses a robot without a drive"
     pushed = isinstance(drive.mechanism, Pushed)
-    keys = [key_for(force.topic, name) for force in model.forces] if pushed else [key_for(drive.command_topic, name)]
+    keys = [*([] if pushed else [drive.command_topic]), *(force.topic for force in model.forces)]
+    keys = [key_for(key, name) for key in keys]
     for topic, known in ((drive.command_topic, "cmd_vel"), (drive.odometry_topic, "odom")):
         if topic.rpartition("/")[2] != known:
-            how = f"; `holozen teleop --cmd-vel {keys[0]}` drives it" if known == "cmd_vel" and not pushed else ""
-            report(f"sim: warning: {path}: topic {topic!r}: the teleop and the controller use {known!r}{how}")
+            how = (
+                f"; `holozen teleop --cmd-vel {keys[0]}` drives it"
+                if known == "cmd_vel" and not pushed
+                else ""
+            )
+            report(
+                f"sim: warning: {path}: topic {topic!r}: the teleop and the controller use "
+                f"{known!r}{how}"
+            )
     return f"{entity.name} listens on {listed(keys)}"
 
 
@@ -82,23 +125,37 @@ def _read(path: Path, args: argparse.Namespace) -> RobotModel:
     for warning in model.warnings:
         report(f"sim: warning: {warning}")
     if args.drive and not takes(model, args.drive):
-        report(f"sim: warning: {path}: has a drive of its own, which is used; --drive {args.drive} is not")
+        report(
+            f"sim: warning: {path}: has a drive of its own, which is used; --drive {args.drive} "
+            "is not"
+        )
     elif args.drive:
         model = driven(model, args.drive)
     if model.drive is None:
-        raise RobotError(f"{path}: no plugin drives it; add one, or move the whole body: --drive planar_move")
+        advice = "move the whole body: --drive planar_move"
+        if advised_drive(model) == "omni":
+            advice = f"drive its omni wheels: --drive omni; or {advice}"
+        raise RobotError(f"{path}: no plugin drives it; add one, or {advice}")
     if not lump(model).collisions:
-        raise RobotError(f"{path}: no collision shape to stand on; give a link a <box>, <cylinder>, <sphere> or <mesh>")
+        raise RobotError(
+            f"{path}: no collision shape to stand on; give a link a <box>, <cylinder>, <sphere> "
+            "or <mesh>"
+        )
     return model
 
 
 def _valid_name(name: str) -> str:
     """A valid entity name from a model's name, which may hold any character."""
-    word = "".join(letter if letter.isascii() and (letter.isalnum() or letter in "_-") else "_" for letter in name)
+    word = "".join(
+        letter if letter.isascii() and (letter.isalnum() or letter in "_-") else "_"
+        for letter in name
+    )
     return word[:60] if word[:1].isalpha() else f"robot_{word}"[:60]
 
 
 def _reach(part: PlacedShape) -> float:
     """An upper bound (m) of how far a shape extends from the robot's z axis."""
-    size = max((math.hypot(*point) for point in part.shape.points), default=math.hypot(*part.shape.size))
+    size = max(
+        (math.hypot(*point) for point in part.shape.points), default=math.hypot(*part.shape.size)
+    )
     return math.hypot(part.xyz[0], part.xyz[1]) + size

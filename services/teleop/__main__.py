@@ -26,7 +26,11 @@ class Mode(argparse.Action):
     """`--mode` sets the mode of the keys or of Zenoh, depending on its value."""
 
     def __call__(
-        self, _parser: argparse.ArgumentParser, args: argparse.Namespace, word: object, _flag: str | None = None
+        self,
+        _parser: argparse.ArgumentParser,
+        args: argparse.Namespace,
+        word: object,
+        _flag: str | None = None,
     ) -> None:
         setattr(args, "mode" if word in DRIVE_MODES else "zenoh_mode", word)
 
@@ -39,35 +43,99 @@ def parser() -> argparse.ArgumentParser:
         conflict_handler="resolve",
     )
     add = parser.add_argument
-    add("robots", nargs="*", metavar="ROBOT", type=flags.robot,
-        help="names; Tab switches to the next one (none: the robot at the root)")  # fmt: skip
-    add("--robot", action="append", default=[], type=flags.robot, metavar="ROBOT", help="same as the ROBOT argument")
+    add(
+        "robots",
+        nargs="*",
+        metavar="ROBOT",
+        type=flags.robot,
+        help="names; Tab switches to the next one (none: the robot at the root)",
+    )
+    add(
+        "--robot",
+        action="append",
+        default=[],
+        type=flags.robot,
+        metavar="ROBOT",
+        help="same as the ROBOT argument",
+    )
     add("--speed", type=flags.number(0, 1000, "m/s"), default=0.5, help="m/s (default: 0.5)")
     add("--turn", type=flags.number(0, 1000, "rad/s"), default=1.0, help="rad/s (default: 1.0)")
-    add("--speed-limit", type=flags.number(0, 1000, "m/s"), default=1000.0, help="m/s (default: 1000)")
-    add("--turn-limit", type=flags.number(0, 1000, "rad/s"), default=1000.0, help="rad/s (default: 1000)")
-    add("--repeat-rate", type=flags.number(0, 1000, "Hz"), default=20.0,
-        help="Hz; 0: publish only on changes (default: 20)")  # fmt: skip
-    add("--key-timeout", type=flags.number(0, 3600, "s"),
-        help="s that a key counts if no release is reported; 0: latch (default: while it repeats)")  # fmt: skip
-    add("--deadman", action=argparse.BooleanOptionalAction, default=False, help="drive only while space is also held")
-    add("--keys", default="ttk", metavar="LAYOUT", help="ttk, wasd, arrows or a TOML file (default: ttk)")
-    add("--joystick", nargs="?", const="", metavar="DEVICE", help="also drive with a gamepad (default: the first one)")
+    add(
+        "--speed-limit",
+        type=flags.number(0, 1000, "m/s"),
+        default=1000.0,
+        help="m/s (default: 1000)",
+    )
+    add(
+        "--turn-limit",
+        type=flags.number(0, 1000, "rad/s"),
+        default=1000.0,
+        help="rad/s (default: 1000)",
+    )
+    add(
+        "--repeat-rate",
+        type=flags.number(0, 1000, "Hz"),
+        default=20.0,
+        help="Hz; 0: publish only on changes (default: 20)",
+    )
+    add(
+        "--key-timeout",
+        type=flags.number(0, 3600, "s"),
+        help="s that a key counts if no release is reported; 0: latch (default: while it repeats)",
+    )
+    add(
+        "--deadman",
+        action=argparse.BooleanOptionalAction,
+        default=False,
+        help="drive only while space is also held",
+    )
+    add(
+        "--keys",
+        default="ttk",
+        metavar="LAYOUT",
+        help="ttk, wasd, arrows or a TOML file (default: ttk)",
+    )
+    add(
+        "--joystick",
+        nargs="?",
+        const="",
+        metavar="DEVICE",
+        help="also drive with a gamepad (default: the first one)",
+    )
     add(
         "--plain",
         action=argparse.BooleanOptionalAction,
         default=False,
         help="one line per second instead of a screen, for screen readers and logs",
     )
-    add("--script", metavar="FILE", help="drive by a script, without a terminal; - reads standard input")
-    add("--stamped", action=argparse.BooleanOptionalAction, default=False, help="publish TwistStamped instead of Twist")
+    add(
+        "--script",
+        metavar="FILE",
+        help="drive by a script, without a terminal; - reads standard input",
+    )
+    add(
+        "--stamped",
+        action=argparse.BooleanOptionalAction,
+        default=False,
+        help="publish TwistStamped instead of Twist",
+    )
     add("--frame-id", default="", metavar="FRAME", help="frame_id of the TwistStamped")
-    add("--cmd-vel", default="", metavar="KEY", type=flags.key,
-        help="where the robot listens (default: [ROBOT/]cmd_vel)")  # fmt: skip
+    add(
+        "--cmd-vel",
+        default="",
+        metavar="KEY",
+        type=flags.key,
+        help="where the robot listens (default: [ROBOT/]cmd_vel)",
+    )
     add("--name", default="teleop", help="name of this node (default: teleop)")
-    connection.add_arguments(parser)
-    add("--mode", action=Mode, choices=(*DRIVE_MODES, *connection.MODES),
-        help="hold: drive while a key is held; latch: until another (default: hold); or Zenoh's mode")  # fmt: skip
+    connection.add_arguments(parser, role="operator")
+    add(
+        "--mode",
+        action=Mode,
+        choices=(*DRIVE_MODES, *connection.MODES),
+        help="hold: drive while a key is held; latch: until another (default: hold); or Zenoh's "
+        "mode",
+    )
     parser.set_defaults(zenoh_mode=None)
     return parser
 
@@ -92,14 +160,20 @@ def main(argv: list[str] | None = None) -> int:
 def _unusable(args: argparse.Namespace) -> str:
     """Why the flags do not go together, or not with where it runs; empty if they do."""
     if args.deadman and (args.script is not None or latches(args)):
-        return "--deadman needs keys that are held, so neither --script nor --mode latch; or give --no-deadman"
+        return (
+            "--deadman needs keys that are held, so neither --script nor --mode latch; or give "
+            "--no-deadman"
+        )
     if args.script is not None and len(set(args.robots)) > 1:
         return f"a script drives one robot, so name one of {listed(args.robots)}"
     if args.script is None and not (sys.stdin.isatty() and sys.stdout.isatty()):
         from holozen.wire import key_for
 
         key = args.cmd_vel or key_for("cmd_vel", args.robots[0] if args.robots else "")
-        return f"needs a terminal for its keys; without one: --script FILE, or {WITHOUT.format(key=key)}"
+        return (
+            "needs a terminal for its keys; without one: --script FILE, or "
+            f"{WITHOUT.format(key=key)}"
+        )
     return ""
 
 
@@ -109,7 +183,9 @@ def latches(args: argparse.Namespace) -> bool:
 
 
 def drive(args: argparse.Namespace, layout: "Layout") -> int:
-    """Drive from the terminal until quit, a signal or an error; the robot is stopped in each case."""
+    """Drive from the terminal until quit, a signal or an error; the robot is stopped in each
+    case.
+    """
     from .app import ENDS, TeleopApp, TeleopError
     from .input.gamepad import Joystick, JoystickError
     from .input.terminal import Terminal
@@ -121,12 +197,14 @@ def drive(args: argparse.Namespace, layout: "Layout") -> int:
         report(f"teleop: {error}")
         return 1
     term = os.environ.get("TERM", "dumb")
-    plain, ascii = args.plain or term == "dumb", term == "linux"  # its font lacks the drawing characters
+    # its font lacks the drawing characters
+    plain, ascii = (args.plain or term == "dumb", term == "linux")
     with open_bus(args) as bus:
         session = open_session(args, bus, layout)
         telemetry = Telemetry(session)
         for number in ENDS:
-            signal.signal(number, _quit)  # until the app handles them: the terminal must be restored
+            # until the app handles them: the terminal must be restored
+            signal.signal(number, _quit)
         try:
             with Terminal(full=not plain) as terminal:
                 colour = not os.environ.get("NO_COLOR")
@@ -142,8 +220,6 @@ def drive(args: argparse.Namespace, layout: "Layout") -> int:
         except Exception as error:
             report(f"teleop: {type(error).__name__}: {error}; a stop was sent to the robot")
             return 1
-        finally:
-            telemetry.close()
     return 0
 
 
@@ -179,6 +255,16 @@ def open_bus(args: argparse.Namespace) -> "Bus":
     return Bus(args.name, where, lasting=True)
 
 
+def only_robot(bus: "Bus") -> list[str]:
+    """The robot to drive where none was named: the only one there, if it has a name; else the one
+    at the root.
+    """
+    from .session import robots_among
+
+    there = robots_among(bus.endpoints())
+    return list(there) if len(there) == 1 and there != {""} else []
+
+
 def open_session(args: argparse.Namespace, bus: "Bus", layout: "Layout") -> "Session":
     """A session configured by the flags."""
     from .control.twist_mapper import Settings, TwistMapper
@@ -191,7 +277,11 @@ def open_session(args: argparse.Namespace, bus: "Bus", layout: "Layout") -> "Ses
         **{name: getattr(args, name) for name in names},
     )
     return Session(
-        bus, args.robots, TwistMapper(settings, layout), args.frame_id if args.stamped else None, args.cmd_vel
+        bus,
+        args.robots or ([] if args.cmd_vel else only_robot(bus)),
+        TwistMapper(settings, layout),
+        args.frame_id if args.stamped else None,
+        args.cmd_vel,
     )
 
 

@@ -1,7 +1,8 @@
-"""The application: reads keys, publishes commands when due, draws the screen. It runs in prompt_toolkit's loop.
+"""The application: reads keys, publishes commands when due, draws the screen. It runs in
+prompt_toolkit's loop.
 
-Drawing never delays a command: nothing is drawn until the terminal has accepted the last picture, and writing to it
-never blocks.
+Drawing never delays a command: nothing is drawn until the terminal has accepted the last picture,
+and writing to it never blocks.
 """
 
 import asyncio
@@ -22,6 +23,7 @@ from prompt_toolkit.layout import Layout
 from prompt_toolkit.output import DummyOutput
 
 from holozen.process import SIGNALS
+from holozen.system import UPTIME
 
 from .control.key_state import LATCH
 from .control.twist_mapper import STILL
@@ -34,7 +36,7 @@ from .session import Session
 from .telemetry import Telemetry
 from .view import plain_line, render
 
-SHORTEST, LONGEST = 0.001, 0.05  # s between two passes
+MIN_WAIT, MAX_WAIT = 0.001, 0.05  # s between two passes
 REDRAW, LINE_EVERY, RETRY = 0.1, 1.0, 0.01  # s between pictures, lines and attempts
 STALL = 0.4  # s without a pass; keys typed during that time are outdated
 ENDS = (*SIGNALS, signal.SIGQUIT)  # the signals that end it
@@ -60,7 +62,12 @@ class TeleopApp:
         ascii: bool,
         colour: bool,
     ) -> None:
-        self._session, self._terminal, self._telemetry, self._joystick = session, terminal, telemetry, joystick
+        self._session, self._terminal, self._telemetry, self._joystick = (
+            session,
+            terminal,
+            telemetry,
+            joystick,
+        )
         self._plain, self._ascii = plain, ascii
         self._keyboard = Keyboard()
         self._liveness = TerminalLiveness(terminal, self._keyboard)
@@ -81,7 +88,9 @@ class TeleopApp:
             max_render_postpone_time=None,
             terminal_size_polling_interval=None,  # SIGWINCH reports it
             input=TerminalInput(terminal.fileno(), self._read, self._flush, self._pass),
-            output=DummyOutput() if plain else TerminalOutput(terminal.write, terminal.size, colour),
+            output=DummyOutput()
+            if plain
+            else TerminalOutput(terminal.write, terminal.size, colour),
         )
 
         self._app.timeoutlen = None  # type: ignore[assignment]  # no key is the prefix of another
@@ -102,7 +111,9 @@ class TeleopApp:
             loop.call_soon(self._attach)  # once prompt_toolkit has begun to read
 
         try:
-            await self._app.run_async(pre_run=begin, set_exception_handler=False, handle_sigint=False)
+            await self._app.run_async(
+                pre_run=begin, set_exception_handler=False, handle_sigint=False
+            )
         finally:
             self._loop = None
             if self._timer:
@@ -134,25 +145,40 @@ class TeleopApp:
         if not self._readable():
             return []
         self._has_input = True
-        counts = not self._liveness.lost  # keys read together with the answer may have been typed before it
-        return [EventPress(event, counts) for event in self._keyboard.feed(self._terminal.read(), time.monotonic())]
+        # keys read together with the answer may have been typed before it
+        counts = not self._liveness.lost
+        return [
+            EventPress(event, counts)
+            for event in self._keyboard.feed(self._terminal.read(), time.monotonic())
+        ]
 
     def _readable(self) -> bool:
         return bool(select.select([self._terminal.fileno()], [], [], 0)[0])
 
     def _flush(self) -> list[KeyPress]:
-        return [EventPress(event, not self._liveness.lost) for event in self._keyboard.wait(time.monotonic())]
+        return [
+            EventPress(event, not self._liveness.lost)
+            for event in self._keyboard.wait(time.monotonic())
+        ]
 
     def _take(self, event: Event, counts: bool) -> None:
         now = time.monotonic()
         if isinstance(event, Answer):
             return self._take_reply(event, now)
-        if isinstance(event, Key) and not self._quits(event) and (not counts or self._is_old(event, now)):
+        if (
+            isinstance(event, Key)
+            and not self._quits(event)
+            and (not counts or self._is_old(event, now))
+        ):
             return self._session.disregard(event, now)
         if isinstance(event, Key):
             self._liveness.press(now)
         self._do(self._session.take(event, now))
-        if isinstance(event, Key) and "ctrl+p" in (event.name, event.base) and event.kind == "press":
+        if (
+            isinstance(event, Key)
+            and "ctrl+p" in (event.name, event.base)
+            and event.kind == "press"
+        ):
             self._liveness.send_plain_keys_for_docker(now)
             self._session.let_go("to detach from a container: Ctrl-P Ctrl-Q within 2 s")
 
@@ -161,7 +187,9 @@ class TeleopApp:
         return isinstance(event, Key) and self._session.mapper.key(event) == "ctrl+c"
 
     def _is_old(self, event: Key, now: float) -> bool:
-        """Whether a key may have been held since before the terminal was identified, which only typed keys can."""
+        """Whether a key may have been held since before the terminal was identified, which only
+        typed keys can.
+        """
         return self._liveness.is_new(now) and event.kind == "typed"
 
     def _take_reply(self, answer: Answer, now: float) -> None:
@@ -169,7 +197,11 @@ class TeleopApp:
         self._liveness.take_reply(answer, now)
         if lost and not self._liveness.lost and self._session.warning in ("", UNANSWERED):
             self._session.warning = ANSWERS
-        if answer.to == "terminal" and not self._terminal.releases and self._session.mapper.settings.deadman:
+        if (
+            answer.to == "terminal"
+            and not self._terminal.releases
+            and self._session.mapper.settings.deadman
+        ):
             raise TeleopError(HELD_KEYS_NEEDED)
 
     def _pass(self) -> None:
@@ -200,8 +232,12 @@ class TeleopApp:
     def _patience(self) -> float:
         """The time (s) until the next pass."""
         mapper = self._session.mapper
-        due = min(self._draw_at, mapper.key_state.expires, self._session.due if mapper.engaged else math.inf)
-        return min(max(due - time.monotonic(), SHORTEST), LONGEST)
+        due = min(
+            self._draw_at,
+            mapper.key_state.expires,
+            self._session.due if mapper.engaged else math.inf,
+        )
+        return min(max(due - time.monotonic(), MIN_WAIT), MAX_WAIT)
 
     def _steer(self, joystick: Joystick, now: float) -> None:
         if self._session.mapper.stick != self._stick:
@@ -283,11 +319,14 @@ class TeleopApp:
         self._is_continued = False
 
     def _suspend_process(self) -> None:
-        """Ctrl-Z: stop the robot, and return the terminal to the shell until this process is continued."""
+        """Ctrl-Z: stop the robot, and return the terminal to the shell until this process is
+        continued.
+        """
         self._session.halt()
         self._terminal.leave()
         signal.signal(signal.SIGTSTP, signal.SIG_DFL)
-        os.killpg(os.getpgrp(), signal.SIGTSTP)  # the whole group, since the shell waits for our parent too
+        # the whole group, since the shell waits for our parent too
+        os.killpg(os.getpgrp(), signal.SIGTSTP)
         signal.signal(signal.SIGTSTP, self._take_signal)
         self._suspended, self._is_continued = False, True
 
@@ -329,4 +368,4 @@ class TeleopApp:
 
 def _uptime() -> float:
     """Seconds on a clock that, unlike the monotonic one, advances while the computer sleeps."""
-    return time.clock_gettime(time.CLOCK_BOOTTIME)
+    return time.clock_gettime(UPTIME)

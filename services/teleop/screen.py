@@ -1,7 +1,8 @@
 """The terminal as prompt_toolkit sees it: its input, its output, and the picture on it.
 
-prompt_toolkit has no key releases, so `input/kitty.py` parses the keys, and each press carries its whole event. Its own
-output blocks while a terminal hangs, and would block the teleop; this one never blocks.
+prompt_toolkit has no key releases, so `input/kitty.py` parses the keys, and each press carries its
+whole event. Its own output blocks while a terminal hangs, and would block the teleop; this one
+never blocks.
 """
 
 import sys
@@ -24,12 +25,19 @@ from prompt_toolkit.styles import Style
 from .input.kitty import Event
 from .view import Line
 
-STYLE = Style.from_dict({
-    "title": "bold reverse", "driving": "bold ansicyan", "good": "ansigreen", "warning": "bold ansired", "dim": "dim",
-    "alarm": "bold ansired reverse",
-})  # fmt: skip
-# A synchronized update: a terminal that supports it shows the picture at once, others ignore it. prompt_toolkit assumes
-# the cursor where it left it, at the top left, but another program may have moved it since.
+STYLE = Style.from_dict(
+    {
+        "title": "bold reverse",
+        "driving": "bold ansicyan",
+        "good": "ansigreen",
+        "warning": "bold ansired",
+        "dim": "dim",
+        "alarm": "bold ansired reverse",
+    }
+)
+# A synchronized update: a terminal that supports it shows the picture at once, others ignore it.
+# prompt_toolkit assumes the cursor where it left it, at the top left, but another program may have
+# moved it since.
 RESET = "\x1b[0m"
 BEGIN, END = "\x1b[?2026h\x1b[H", "\x1b[?2026l"
 
@@ -43,8 +51,8 @@ class EventPress(KeyPress):
 
 
 class TerminalInput(DummyInput):
-    """Reads a terminal whose modes are already set. `read` returns new keys, `flush` those that are complete since
-    nothing more has arrived; `taken` is called once all input has been processed.
+    """Reads a terminal whose modes are already set. `read` returns new keys, `flush` those that are
+    complete since nothing more has arrived; `taken` is called once all input has been processed.
     """
 
     closed = False
@@ -93,11 +101,17 @@ class TerminalInput(DummyInput):
 
 
 class TerminalOutput(Vt100_Output):
-    """Writes to the terminal without blocking. `Terminal` sets the modes, and always restores them."""
+    """Writes to the terminal without blocking. `Terminal` sets the modes, and always restores
+    them.
+    """
 
-    def __init__(self, write: Callable[[str], None], size: Callable[[], tuple[int, int]], colour: bool = True) -> None:
+    def __init__(
+        self, write: Callable[[str], None], size: Callable[[], tuple[int, int]], colour: bool = True
+    ) -> None:
         depth = ColorDepth.DEPTH_4_BIT if colour else ColorDepth.DEPTH_1_BIT
-        super().__init__(sys.stdout, self._size, default_color_depth=depth, enable_bell=False, enable_cpr=False)
+        super().__init__(
+            sys.stdout, self._size, default_color_depth=depth, enable_bell=False, enable_cpr=False
+        )
         self._write, self._columns_and_rows = write, size
 
     def flush(self) -> None:
@@ -111,7 +125,9 @@ class TerminalOutput(Vt100_Output):
     def _keep(self) -> None:
         """Do nothing: `Terminal` has set this mode, and restores it at the end."""
 
-    enter_alternate_screen = quit_alternate_screen = enable_bracketed_paste = disable_bracketed_paste = _keep
+    enter_alternate_screen = quit_alternate_screen = enable_bracketed_paste = (
+        disable_bracketed_paste
+    ) = _keep
     reset_cursor_key_mode = hide_cursor = show_cursor = _keep
 
     def _size(self) -> Size:
@@ -120,7 +136,9 @@ class TerminalOutput(Vt100_Output):
 
 
 class Picture(Window):
-    """Lines that fill the screen. Unchanged rows are reused, which makes drawing three times as fast."""
+    """Lines that fill the screen. Unchanged rows are reused, which makes drawing three times as
+    fast.
+    """
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,5 +1,5 @@
-"""Scripted driving, without a terminal, for demonstrations and tests: `0.5s i` holds a key for half a second, `1s i J`
-holds two keys for one, `q` presses a key once, `1s` waits, and `stop` stops.
+"""Scripted driving, without a terminal, for demonstrations and tests: `0.5s i` holds a key for half
+a second, `1s i J` holds two keys for one, `q` presses a key once, `1s` waits, and `stop` stops.
 """
 
 import re
@@ -18,12 +18,13 @@ from .input.kitty import Key
 from .session import Session
 from .toml_file import InputError
 
-LONGEST = 3600.0  # s
+MAX_SECONDS = 3600.0  # s
 LARGEST = 1_000_000  # characters
 TICK = 0.005  # s
 PATIENCE = 3.0  # s to wait for a subscriber
 DOUBT = 0.5  # s without being obeyed after which it gives up; the sim reports its status at 10 Hz
-UNHEARD = 1.5  # s of commands after which it gives up if the sim has obeyed none; it first measures our clock
+# s of commands after which it gives up if the sim has obeyed none; it first measures our clock
+UNHEARD = 1.5
 DURATION = re.compile(r"(\d+(?:\.\d*)?|\.\d+)(ms|s)")
 
 
@@ -48,7 +49,9 @@ def load(path: str, layout: Layout) -> list[Step]:
 
 
 def parse(text: str, name: str, layout: Layout) -> list[Step]:
-    """The steps of a script, in which `#` starts a comment. Raises InputError with the `name` and the line."""
+    """The steps of a script, in which `#` starts a comment. Raises InputError with the `name` and
+    the line.
+    """
     if len(text) > LARGEST:
         raise InputError(f"{name}: longer than {LARGEST} characters")
     steps = []
@@ -64,12 +67,14 @@ def _step(words: list[str], where: str, layout: Layout) -> Step:
         return Step(0.0, ())
     match = DURATION.fullmatch(words[0])
     seconds = float(match[1]) / (1000 if match[2] == "ms" else 1) if match else 0.0
-    if seconds > LONGEST:
-        raise InputError(f"{where}: {words[0]!r} is longer than {LONGEST:g}s")
+    if seconds > MAX_SECONDS:
+        raise InputError(f"{where}: {words[0]!r} is longer than {MAX_SECONDS:g}s")
     keys = tuple(words[1:] if match else words)
     for key in keys:
         if key not in layout.moves and key not in layout.speeds:
-            raise InputError(f"{where}: {key!r} is not a key of {layout.name}; write `0.5s i`, `q` or `stop`")
+            raise InputError(
+                f"{where}: {key!r} is not a key of {layout.name}; write `0.5s i`, `q` or `stop`"
+            )
         if key in layout.moves and not seconds:
             raise InputError(f"{where}: how long is {key!r} held? write `0.5s {key}`")
     return Step(seconds, keys)
@@ -104,7 +109,10 @@ def _nobody(session: Session) -> str:
     meant = suggest(missing, there, lambda key: key.rpartition("/")[0])
     flag = "" if all(key.endswith("cmd_vel") for key in there) else ", which --cmd-vel chooses"
     others = f"{meant}; there are some on {listed(there)}{flag}"
-    return f"no subscriber on {missing}{others if there else '; start a sim in another terminal: holozen sim'}"
+    return (
+        "no subscriber on "
+        f"{missing}{others if there else '; start a sim in another terminal: holozen sim'}"
+    )
 
 
 def _hold(session: Session, until: float, stop: threading.Event) -> str:

@@ -6,13 +6,28 @@ from collections.abc import Mapping
 
 from . import toml_file
 from .control.layouts import LAYOUTS
-from .ros_args import PARAMETERS, ros_arguments
 from .toml_file import InputError, cut, one_of
 
-NAMES = (*PARAMETERS, "mode", "keys", "plain", "deadman", "joystick")
+NAMES = (
+    "speed",
+    "turn",
+    "speed_limit",
+    "turn_limit",
+    "repeat_rate",
+    "key_timeout",
+    "stamped",
+    "frame_id",
+    "mode",
+    "keys",
+    "plain",
+    "deadman",
+    "joystick",
+)
 """The flags that the file may set. Robot and network are given on the command line only."""
 
 MODES = ("hold", "latch")  # the flag also accepts Zenoh's modes, which belong to the network
+
+FLAGS_INSTEAD = "the flags here are --speed, --turn, --robot and those of --help"
 
 Setting = str | int | float | bool
 
@@ -20,27 +35,36 @@ Setting = str | int | float | bool
 def path(environ: Mapping[str, str] = os.environ) -> str | None:
     """The path of the settings file; None if there is no home folder."""
     folder = environ.get("XDG_CONFIG_HOME", "")
-    if not os.path.isabs(folder):  # must be ignored according to the XDG Base Directory Specification
+    # must be ignored according to the XDG Base Directory Specification
+    if not os.path.isabs(folder):
         home = environ.get("HOME", "")
         folder = os.path.join(home, ".config") if os.path.isabs(home) else ""
     return os.path.join(folder, "holozen", "teleop.toml") if folder else None
 
 
 def read(path: str | None) -> dict[str, Setting]:
-    """The settings in the file, their names and types checked; empty without a file. Raises InputError."""
+    """The settings in the file, their names and types checked; empty without a file. Raises
+    InputError.
+    """
     if path is None or not os.path.lexists(path):
         return {}
     found = toml_file.read(path)
     for name, value in found.items():
         if name not in NAMES:
-            raise InputError(f"{path}: {cut(name)} is unknown{one_of(name.replace('-', '_'), [*NAMES])}")
+            raise InputError(
+                f"{path}: {cut(name)} is unknown{one_of(name.replace('-', '_'), [*NAMES])}"
+            )
         if not isinstance(value, Setting):
-            raise InputError(f"{path}: {name} is {cut(value)}; write one number, true, false or a text in quotes")
+            raise InputError(
+                f"{path}: {name} is {cut(value)}; write one number, true, false or a text in quotes"
+            )
     return found
 
 
 def apply(parser: argparse.ArgumentParser, path: str | None) -> None:
-    """Make the file's settings the defaults of the flags, after the flags' own checks. Raises InputError."""
+    """Make the file's settings the defaults of the flags, after the flags' own checks. Raises
+    InputError.
+    """
     actions = {action.dest: action for action in parser._actions if action.option_strings}
     values: dict[str, object] = {}
     for name, value in read(path).items():
@@ -54,9 +78,13 @@ def apply(parser: argparse.ArgumentParser, path: str | None) -> None:
     parser.set_defaults(**values)
 
 
-def parse(parser: argparse.ArgumentParser, words: list[str], path: str | None) -> argparse.Namespace:
-    """Parse flags and ROS arguments, with the file's settings as defaults. Raises InputError."""
-    words = ros_arguments(words)
+def parse(
+    parser: argparse.ArgumentParser, words: list[str], path: str | None
+) -> argparse.Namespace:
+    """Parse flags, with the file's settings as defaults. Raises InputError."""
+    for word in words:
+        if word == "--ros-args" or (":=" in word and not word.startswith("-")):
+            raise InputError(f"{cut(word)} is ROS's; {FLAGS_INSTEAD}")
     parser.parse_args(words)  # first, so that --help and errors in flags do not depend on the file
     apply(parser, path)
     return parser.parse_args(words)

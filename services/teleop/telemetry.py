@@ -1,50 +1,20 @@
-"""What the screen shows of a robot: its position, the link to the sim, and the source that drives."""
+"""What the screen shows of a robot: its position, the link to the sim, and the source that
+drives.
+"""
 
 import math
-import threading
-import time
 from collections import deque
 
-from holozen.bus import Bus
 from holozen.limits import STOP, Planar
-from holozen.messages import CommandStatus, Odometry, TriggerRequest, Twist
-from holozen.transport.errors import BusError
+from holozen.messages import CommandStatus, Odometry, Twist
 
 from .control.twist_mapper import DEAD_MAN
 from .session import Session
 from .view import Source, State
 
-ASK_EVERY, ASK_LIMIT = 1.0, 1.0  # s
-CLOSE_LIMIT = 0.4  # s
 TRAIL_STEP, TRAIL_LENGTH = 0.05, 400  # m, points
 PACE_OVER = 1.0  # s of odom over which the real-time factor is measured
 FARTHEST = 1e6  # m; positions beyond are ignored
-
-
-class RoundTrip:
-    """Measures the sim's response time once a second. `close` it before the bus."""
-
-    def __init__(self, bus: Bus, key: str) -> None:
-        self.key = key  # the key to query
-        self.seconds: float | None = None
-        self._bus = bus
-        self._closing = threading.Event()
-        self._thread = threading.Thread(target=self._measure, daemon=True)
-        self._thread.start()
-
-    def close(self) -> None:
-        """End the measurement."""
-        self._closing.set()
-        self._thread.join(CLOSE_LIMIT)
-
-    def _measure(self) -> None:
-        while not self._closing.wait(ASK_EVERY):
-            began = time.monotonic()
-            try:
-                self._bus.call(self.key, TriggerRequest(), CommandStatus, ASK_LIMIT)
-                self.seconds = time.monotonic() - began
-            except BusError:
-                self.seconds = None
 
 
 class Track:
@@ -79,28 +49,47 @@ class Track:
         return (ended - began) / (now - ours) if now - ours > PACE_OVER / 2 else None
 
 
+class Refusals:
+    """Why the robot refuses what this teleop commands. A refusal is over once a later command is
+    accepted.
+    """
+
+    def __init__(self) -> None:
+        self._accepted = 0  # commands, at the last status
+        self._refused = 0
+        self._reason = ""
+
+    def see(self, status: CommandStatus, source: str) -> str:
+        """Take the latest status. Returns why the robot refuses the commands of `source` now; empty
+        if it does not.
+        """
+        accepted, refused = status.accepted, sum(status.refused.values())
+        if refused != self._refused:
+            is_ours = status.last_refusal.startswith(f"{source}: ")
+            self._reason = status.last_refusal.partition(": ")[2] if is_ours else ""
+        elif accepted != self._accepted:
+            self._reason = ""
+        self._accepted, self._refused = accepted, refused
+        return self._reason
+
+
 class Telemetry:
     """Collects the state to show."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._track, self._tracked = Track(), session.client
-        self._round_trip = RoundTrip(session.bus, session.client.status_key)
-
-    def close(self) -> None:
-        """End the measurement of the link."""
-        self._round_trip.close()
+        self._track, self._refusals, self._tracked = Track(), Refusals(), session.client
 
     def state(self, why: str, now: float, ascii: bool) -> State:
         """The state to show. `why` is the reason for the mode."""
         session, client = self._session, self._session.client
         if client is not self._tracked:
-            self._track, self._tracked = Track(), client
-        self._round_trip.key = client.status_key
+            self._track, self._refusals, self._tracked = Track(), Refusals(), client
         odom, age = client.odom.read()
         if odom is not None:
             self._track.see(odom, now)
         status = client.status()
+        refusal = self._refusals.see(status, session.bus.source)
         settings = session.mapper.settings
         return State(
             robot=client.robot,
@@ -110,7 +99,7 @@ class Telemetry:
             measured=_planar(odom.twist.twist) if odom else STOP,
             odom_age=age,
             stale=client.odom.is_stale,
-            round_trip=self._round_trip.seconds,
+            round_trip=_round_trip(status, session.bus.source),
             real_time_factor=self._track.real_time_factor(),
             pose=self._track.pose,
             trail=self._track.trail,
@@ -119,7 +108,7 @@ class Telemetry:
             key=client.key,
             keys=session.mapper.layout.table if session.help else session.mapper.layout.help,
             help=session.help,
-            warning=session.warning or _unmoved(session, status) or _refusal(status, session.bus.source),
+            warning=session.warning or _unmoved(session, status) or refusal,
             why=why,
             ascii=ascii,
             mode=settings.mode,
@@ -133,12 +122,27 @@ class Telemetry:
             held=status.held,
             stopped=status.stopped,
             paused=client.odom.is_paused,
-            sources=[Source(s.source, s.priority, s.rate, s.obeyed, s.held) for s in status.sources],
+            sources=[
+                Source(s.source, s.priority, s.rate, s.obeyed, s.held) for s in status.sources
+            ],
         )
+
+
+def _round_trip(status: CommandStatus, source: str) -> float | None:
+    """Seconds from the beat that our last command returned until it was read: the way here and
+    back, and up to 50 ms between two beats. None before the first command.
+    """
+    return next(
+        (one.delay for one in status.sources if one.source == source and one.delay > 0), None
+    )
 
 
 def _unmoved(session: Session, status: CommandStatus) -> str:
     """Why the robot moves slower than the keys command, or not at all; empty if it obeys them."""
+    if session.waiting:
+        return session.waiting
+    if status.limited and status.obeyed == session.bus.source:
+        return status.limited
     settings, (x, y, _, turn) = session.mapper.settings, session.mapper.motion
     if y and not status.strafes:
         return "this robot cannot strafe: its drive only goes forward, backward and turns"
@@ -151,8 +155,3 @@ def _unmoved(session: Session, status: CommandStatus) -> str:
 
 def _planar(twist: Twist) -> Planar:
     return twist.linear.x, twist.linear.y, twist.angular.z
-
-
-def _refusal(status: CommandStatus, source: str) -> str:
-    """Why the last refused command was refused, if it was ours; else empty."""
-    return status.last_refusal.partition(": ")[2] if status.last_refusal.startswith(f"{source}: ") else ""

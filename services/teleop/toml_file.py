@@ -1,4 +1,6 @@
-"""Reads small hand-written TOML files. Errors in them, and in all other input of the teleop, are one line."""
+"""Reads small hand-written TOML files. Errors in them, and in all other input of the teleop, are
+one line.
+"""
 
 import os
 import re
@@ -9,19 +11,23 @@ from holozen.console import printable
 from holozen.suggest import shorten, suggest
 
 LARGEST = 64 * 1024  # bytes
-LONGEST = 1000  # characters in a line; a long dotted key keeps tomllib busy for many seconds
+MAX_LINE = 1000  # characters in a line; a long dotted key keeps tomllib busy for many seconds
 _PLACE = re.compile(r"(.*) \(at (?:line (\d+), column \d+|end of document)\)", re.DOTALL)
 
 
 class InputError(ValueError):
-    """A file or an argument that cannot be used; the text is one printable line with the place and the reason."""
+    """A file or an argument that cannot be used; the text is one printable line with the place and
+    the reason.
+    """
 
     def __init__(self, text: str) -> None:
         super().__init__(printable(text))
 
 
 def read(path: str) -> dict[str, Any]:
-    """The contents of the file, unchecked. Raises InputError. It never blocks, not even on a FIFO."""
+    """The contents of the file, unchecked. Raises InputError. It never blocks, not even on a
+    FIFO.
+    """
     import tomllib  # most runs do not need it
 
     try:
@@ -29,8 +35,8 @@ def read(path: str) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: is not UTF-8 text (byte {error.start})") from None
     for number, line in enumerate(text.split("\n"), 1):
-        if len(line) > LONGEST:
-            raise InputError(f"{path}:{number}: is longer than {LONGEST} characters")
+        if len(line) > MAX_LINE:
+            raise InputError(f"{path}:{number}: is longer than {MAX_LINE} characters")
     try:
         return tomllib.loads(text)
     except RecursionError:
@@ -45,7 +51,9 @@ def cut(value: object) -> str:
 
 
 def one_of(name: str, known: list[str]) -> str:
-    """The end of a message about an unknown name: the closest known one, or all of them if none is close."""
+    """The end of a message about an unknown name: the closest known one, or all of them if none is
+    close.
+    """
     return suggest(name, known) or f"; use {', '.join(known)}"
 
 

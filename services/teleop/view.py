@@ -1,4 +1,6 @@
-"""Lays the screen out as styled lines, for a terminal of any size. Pure: a `State` in, lines out."""
+"""Lays the screen out as styled lines, for a terminal of any size. Pure: a `State` in, lines
+out.
+"""
 
 import math
 from collections.abc import Sequence
@@ -8,9 +10,12 @@ from msgspec import Struct
 
 from holozen.limits import STOP, Planar
 from holozen.plotting import FARTHEST, Plane, Robot, drawn
+from holozen.wire import SENDERS
 
 Line = list[tuple[str, str]]
-"""(style, text) from left to right; a style is "", "title", "driving", "good", "warning", "dim" or "alarm"."""
+"""(style, text) from left to right; a style is "", "title", "driving", "good", "warning", "dim" or
+"alarm".
+"""
 
 
 class Source(Struct):
@@ -26,7 +31,8 @@ class Source(Struct):
 class State(Struct):
     """Everything that the screen shows, in m, rad, m/s, rad/s and s.
 
-    Names and warnings came over the wire and may hold anything; they are made printable where they are drawn.
+    Names and warnings came over the wire and may hold anything; they are made printable where they
+    are drawn.
     """
 
     robot: str = ""  # "" is the robot at the root
@@ -77,14 +83,18 @@ LINK_LIMIT = 0.25  # s of round trip; beyond, the operator steers by outdated da
 
 
 def clean(text: str, longest: int = 200) -> str:
-    """The text in printable ASCII, whose width is its length, cut to `longest` characters; `?` for all others."""
+    """The text in printable ASCII, whose width is its length, cut to `longest` characters; `?` for
+    all others.
+    """
     if not (text.isascii() and text.isprintable()):
         text = "".join(letter if " " <= letter <= "~" else "?" for letter in text[: longest + 1])
     return text if len(text) <= longest else text[: max(0, longest - 1)] + "~"
 
 
 def number(value: float) -> str:
-    """A velocity with its sign, in at most 7 characters: +0.500, -12.34, +1e+300. There is no -0.000."""
+    """A velocity with its sign, in at most 7 characters: +0.500, -12.34, +1e+300. There is no
+    -0.000.
+    """
     if abs(value) < 5e-4:
         value = 0.0
     size = abs(value)
@@ -119,7 +129,9 @@ def planar(velocity: tuple[float, float, float]) -> str:
 
 
 def alarms(state: State) -> list[list[str]]:
-    """The alarms, the most severe first; each is a list of wordings, from the longest to the shortest."""
+    """The alarms, the most severe first; each is a list of wordings, from the longest to the
+    shortest.
+    """
     found = []
     if state.stopped:
         release = f"`holozen release{' ' * bool(state.robot)}{clean(state.robot, 64)}`"
@@ -129,13 +141,20 @@ def alarms(state: State) -> list[list[str]]:
         play = "PAUSED: `holozen sim play`"
         found.append([f"{play} continues the sim", play, "PAUSED"])
     if state.detached:
-        found.append(["terminal detached: hands off; attach to it again to drive", "terminal detached: hands off"])
+        found.append(
+            [
+                "terminal detached: hands off; attach to it again to drive",
+                "terminal detached: hands off",
+            ]
+        )
     if not state.listeners:
         found.append([f"NO SUBSCRIBER on {clean(state.key, 100)}", "NO SUBSCRIBER"])
     if not math.isfinite(state.odom_age):
         found.append(["NO ODOM: nothing was heard from a robot", "NO ODOM"])
     elif state.stale:
-        found.append([f"ODOM IS STALE: the last one came {seconds(state.odom_age)} ago", "ODOM IS STALE"])
+        found.append(
+            [f"ODOM IS STALE: the last one came {seconds(state.odom_age)} ago", "ODOM IS STALE"]
+        )
     if state.round_trip is not None and state.round_trip > LINK_LIMIT:
         delay = seconds(state.round_trip)
         found.append([f"SLOW LINK: the robot answers {delay} later", f"SLOW LINK: {delay}"])
@@ -167,7 +186,9 @@ LONG = 72  # columns from which on the axes have long names and units
 
 
 def velocity_bars(state: State, columns: int) -> list[Line]:
-    """Five lines: a header, a line for each of x, y and turn, and the set speeds with their limits."""
+    """Five lines: a header, a line for each of x, y and turn, and the set speeds with their
+    limits.
+    """
     long = columns >= LONG
     label, unit, gap = (11, 6, 3) if long else (6, 0, 1)
     cells = min(41, max(3, (columns - label - unit - gap) // 2 - NUMBER))
@@ -185,24 +206,37 @@ def velocity_bars(state: State, columns: int) -> list[Line]:
 
 
 def _header(state: State, label: int, half: int) -> Line:
-    style, text = ("driving" if state.moving else "", "command") if state.command else ("dim", "command: silent")
+    style, text = (
+        ("driving" if state.moving else "", "command")
+        if state.command
+        else ("dim", "command: silent")
+    )
     known = ("", "measured") if state.known else ("dim", "measured: unknown")
     return [("", " " * label), (style, text.ljust(half)), known]
 
 
 def _settings(state: State, second: int) -> Line:
-    """The line of the set speeds. The turn begins at the column `second`, or if that is 0, after the speed."""
+    """The line of the set speeds. The turn begins at the column `second`, or if that is 0, after
+    the speed.
+    """
     speed, turn = amount(state.speed), amount(state.turn)
     most, fastest = f"{state.speed_limit:.4g}", f"{state.turn_limit:.4g}"
     if not second:
-        return [("", f" speed {speed}"), ("dim", f" of {most}"), ("", f"  turn {turn}"), ("dim", f" of {fastest}")]
+        return [
+            ("", f" speed {speed}"),
+            ("dim", f" of {most}"),
+            ("", f"  turn {turn}"),
+            ("dim", f" of {fastest}"),
+        ]
     parts = [("", f" speed     {speed}"), ("dim", f" m/s, limit {most}")]
     parts.append(("", " " * (second - sum(len(text) for _, text in parts))))
     return [*parts, ("", f"turn {turn}"), ("dim", f" rad/s, limit {fastest}")]
 
 
 def _scale(state: State, axis: int) -> float:
-    """The value of a full bar: the set speed, or more if it is exceeded. x and y share one scale."""
+    """The value of a full bar: the set speed, or more if it is exceeded. x and y share one
+    scale.
+    """
     axes, setting = ((2,), state.turn) if axis == 2 else ((0, 1), state.speed)
     shown = [state.command] if state.command else []
     shown += [state.measured] if state.known else []
@@ -210,7 +244,9 @@ def _scale(state: State, axis: int) -> float:
     return max([setting, *(size for size in sizes if math.isfinite(size))])
 
 
-def _cell(velocity: Planar | None, axis: int, most: float, cells: int, style: str, ascii: bool) -> Line:
+def _cell(
+    velocity: Planar | None, axis: int, most: float, cells: int, style: str, ascii: bool
+) -> Line:
     if velocity is None:
         return [*bar(0.0, cells, style, ascii), ("dim", "-".rjust(NUMBER))]
     value = velocity[axis]
@@ -224,8 +260,8 @@ def _cell(velocity: Planar | None, axis: int, most: float, cells: int, style: st
 
 
 def bar(part: float, cells: int, style: str, ascii: bool = False) -> Line:
-    """A bar for a `part` from -1 to 1, in an odd number of cells: from the middle to the right, or to the left if it is
-    negative.
+    """A bar for a `part` from -1 to 1, in an odd number of cells: from the middle to the right, or
+    to the left if it is negative.
     """
     full, half, rest = ("=", "=", "-") if ascii else ("▄", "▖" if part > 0 else "▗", "▁")
     side = cells // 2
@@ -265,7 +301,9 @@ def _plain_links(state: State) -> list[str]:
         parts.append("listening: " + ", ".join(clean(name, 64) for name in state.listeners))
     others = [source for source in state.sources if source.name != state.source]
     if others:
-        parts.append("also sending: " + ", ".join(f"{clean(s.name, 64)}{' (held)' * s.held}" for s in others))
+        parts.append(
+            "also sending: " + ", ".join(f"{clean(s.name, 64)}{' (held)' * s.held}" for s in others)
+        )
     return parts
 
 
@@ -275,10 +313,13 @@ LEFT = 55  # columns of the left side
 LABEL = 11  # columns before a value
 KEYS = 41  # columns of a line of help
 ROOMY = 30  # rows from which on everything fits
-SLOW, LATE = 0.1, 0.95  # s of round trip, and real-time factor; worse values are noticeable when driving
+# s of round trip, and real-time factor; worse values are noticeable when driving
+SLOW, LATE = (0.1, 0.95)
 
 Ranked = tuple[int, Line]
-"""A rank and a line: if there is no room for all lines, those of the highest rank are dropped first."""
+"""A rank and a line: if there is no room for all lines, those of the highest rank are dropped
+first.
+"""
 
 ALARM, SPEED, DRIVER, SETTING, HEADER, TITLE, LINK, BLANK, SPARE = range(9)
 EMPTY: Ranked = (BLANK, [])
@@ -312,13 +353,26 @@ def _wide(state: State, loud: list[Ranked], columns: int, rows: int) -> list[Lin
 
 
 def _narrow(state: State, loud: list[Ranked], columns: int, rows: int) -> list[Line]:
-    """All parts below one another. With few rows or columns, velocities are text instead of bars."""
+    """All parts below one another. With few rows or columns, velocities are text instead of
+    bars.
+    """
     driving, how = [("", " "), driver(state)], [("", f" {mode(state)}")]
     if columns >= SHORT and rows >= len(loud) + 6:
         speeds = _speeds(state, columns)
     else:
-        speeds, driving, how = [(SPEED, line) for line in _compact(state, columns)], driving[1:], [("", mode(state))]
-    lines = [_title(state, columns), *loud, (DRIVER, driving), (DRIVER, how), *speeds, *_links(state, columns, 3)]
+        speeds, driving, how = (
+            [(SPEED, line) for line in _compact(state, columns)],
+            driving[1:],
+            [("", mode(state))],
+        )
+    lines = [
+        _title(state, columns),
+        *loud,
+        (DRIVER, driving),
+        (DRIVER, how),
+        *speeds,
+        *_links(state, columns, 3),
+    ]
     if state.warning:
         lines.append((SETTING, _warning(state)))
     shown = _fit(lines, rows)
@@ -348,13 +402,17 @@ def _columns(texts: list[str], columns: int, rows: int) -> tuple[list[str], int]
         start = max(map(len, lines)) + bool(shown or columns >= KEYS)  # a blank before each
         if shown and start + max(map(len, beside)) > columns:
             break
-        lines = [f"{line:<{start}}{text}" for line, text in zip_longest(lines, beside, fillvalue="")]
+        lines = [
+            f"{line:<{start}}{text}" for line, text in zip_longest(lines, beside, fillvalue="")
+        ]
         shown += len(beside)
     return lines, len(texts) - shown
 
 
 def _alarms(state: State, columns: int, rows: int) -> list[Line]:
-    """The alarms, each as wide as the screen and in the longest wording that fits; all in one line if they are many."""
+    """The alarms, each as wide as the screen and in the longest wording that fits; all in one line
+    if they are many.
+    """
     found = alarms(state)
     if len(found) >= rows:
         all_of_them = " + ".join(wordings[-1] for wordings in found)
@@ -389,7 +447,9 @@ def _compact(state: State, columns: int) -> list[Line]:
     pace = ("", f"speed {speed} of {short(abs(state.speed))[1:]}")
     if columns < 72:
         return [[pace], [(style, f"go {command}")], [("", f"is {measured}")]]
-    return [[("", " "), pace, ("", "   command "), (style, command), ("", f"   measured {measured}")]]
+    return [
+        [("", " "), pace, ("", "   command "), (style, command), ("", f"   measured {measured}")]
+    ]
 
 
 def _links(state: State, columns: int, most: int) -> list[Ranked]:
@@ -413,16 +473,24 @@ def _odom(state: State) -> Line:
     if not math.isfinite(state.odom_age):
         return _labelled("odom age", ("warning", "none"))
     style, age = "good" if state.known else "warning", state.odom_age
-    return _labelled("odom age", (style, (f"{age * 1000:.0f} ms" if age < 1 else seconds(age)).ljust(6)))
+    return _labelled(
+        "odom age", (style, (f"{age * 1000:.0f} ms" if age < 1 else seconds(age)).ljust(6))
+    )
 
 
 def _pace(state: State) -> Line:
     trip, factor = state.round_trip, state.real_time_factor
     parts: Line = []
     if trip is not None:
-        parts += [("dim", " round trip "), ("" if trip < SLOW else "warning", f"{seconds(trip):<9}")]
+        parts += [
+            ("dim", " round trip "),
+            ("" if trip < SLOW else "warning", f"{seconds(trip):<9}"),
+        ]
     if factor is not None:
-        parts += [("dim", " real time "), ("" if factor > LATE else "warning", f"{short(abs(factor))[1:]}x")]
+        parts += [
+            ("dim", " real time "),
+            ("" if factor > LATE else "warning", f"{short(abs(factor))[1:]}x"),
+        ]
     return parts
 
 
@@ -430,7 +498,8 @@ def _source(state: State, source: Source) -> Line:
     verdict = "obeyed" if source.obeyed else "held" if source.held else "waits"
     ours = bool(source.name) and source.name == state.source
     name = "you" if ours else clean(source.name, 20)
-    text = f"{verdict:<6} {clean(f'{source.rate:3.0f}', 4)} Hz  {name} {clean(source.priority, 20)}"
+    kind = clean(SENDERS.get(source.priority, source.priority), 20)
+    text = f"{verdict:<6} {clean(f'{source.rate:3.0f}', 4)} Hz  {name} {kind}"
     return [("good" if ours and source.obeyed else "" if source.obeyed else "dim", text)]
 
 
@@ -455,7 +524,9 @@ def _warning(state: State) -> Line:
 
 
 def _sides(left: Line, right: Line, columns: int) -> Line:
-    """One part at the left edge, and one at the right edge, cut to fit, with two blanks or more between them."""
+    """One part at the left edge, and one at the right edge, cut to fit, with two blanks or more
+    between them.
+    """
     room = columns - sum(len(text) for _, text in left) - 2
     fits = _cut(right, max(0, room))
     return [*left, ("", " " * (room + 2 - sum(len(text) for _, text in fits))), *fits]
@@ -491,7 +562,9 @@ PLACES = {"sign": "driving", "trail": "good", "grid": "dim", "": ""}
 
 
 def chart(state: State, columns: int, rows: int) -> list[Line]:
-    """The map: `rows` lines of at most `columns` characters, the last with the pose and the scale."""
+    """The map: `rows` lines of at most `columns` characters, the last with the pose and the
+    scale.
+    """
     if columns < 8 or rows < 3:
         return []
     pose = state.pose

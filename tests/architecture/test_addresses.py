@@ -11,11 +11,21 @@ REPO = Path(__file__).parents[2]
 HOSTS = [
     ".".join(parts)
     for parts in (
-        ("pypi", "org"), ("pythonhosted", "org"), ("crates", "io"), ("anaconda", "org"), ("npmjs", "org"),
-        ("deb.debian", "org"), ("archive.ubuntu", "com"), ("ghcr", "io"), ("quay", "io"), ("gcr", "io"),
-        ("docker", "io/"), ("hub.docker", "com"), ("proxy.golang", "org"),
+        ("pypi", "org"),
+        ("pythonhosted", "org"),
+        ("crates", "io"),
+        ("anaconda", "org"),
+        ("npmjs", "org"),
+        ("deb.debian", "org"),
+        ("archive.ubuntu", "com"),
+        ("ghcr", "io"),
+        ("quay", "io"),
+        ("gcr", "io"),
+        ("docker", "io/"),
+        ("hub.docker", "com"),
+        ("proxy.golang", "org"),
     )
-]  # fmt: skip
+]
 # /home/asha is the machine of an invented student, in tests about files that name such a place.
 HOMES = re.compile(r"(?<![\w.$}{*~-])/(?:root/|work/|(?:Users|home)/(?!asha\b))[\w.]")
 
@@ -44,11 +54,20 @@ def test_no_file_names_the_host_of_a_registry() -> None:
 
 def test_no_file_names_a_folder_of_somebodys_machine() -> None:
     here = f"{REPO}/"
-    assert [where for where, line in lines() if HOMES.search(line) or (len(REPO.parts) > 2 and here in line)] == []
+    assert [
+        where
+        for where, line in lines()
+        if HOMES.search(line) or (len(REPO.parts) > 2 and here in line)
+    ] == []
 
 
 def test_the_pattern_finds_folders_and_nothing_else() -> None:
-    for line in ("cd /" + "root/holozen", "see '/" + "home/me/x'", "file:///" + "home/me/x", "/" + "work/x"):
+    for line in (
+        "cd /" + "root/holozen",
+        "see '/" + "home/me/x'",
+        "file:///" + "home/me/x",
+        "/" + "work/x",
+    ):
         assert HOMES.search(line), line
     for line in ("docs/work/notes and ~/home/x", "/home/asha/catkin_ws", "$HOME/root/x"):
         assert not HOMES.search(line), line

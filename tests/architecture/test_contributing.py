@@ -1,42 +1,51 @@
-"""CONTRIBUTING.md is true of the code: files, functions, and the length of the two paths."""
+"""CONTRIBUTING.md is true of the code: the files and names of its lists."""
 
-import ast
 import re
-from itertools import groupby
 from pathlib import Path
 
 REPO = Path(__file__).parents[2]
-LONGEST = 12  # modules from a key press to a command, and from a command to odometry
-ROW = re.compile(r"\| `((?:holozen|services)/\S+\.py)` \| (.+) \|")
+PAGE = (REPO / "CONTRIBUTING.md").read_text()
+PLACEHOLDER = re.compile(r"NAME|NOUN|PACKAGE")
+PARTS = PAGE.partition("## How to add")[2].partition("\n## ")[0]
 
 
-def tables() -> list[list[tuple[str, list[str]]]]:
-    """The tables of files and their functions."""
-    rows = [ROW.fullmatch(line) for line in (REPO / "CONTRIBUTING.md").read_text().splitlines()]
-    groups = [list(group) for there, group in groupby(rows, bool) if there]
-    return [
-        [(row[1], re.findall(r"`([A-Z]\w*(?:\.\w+)?|[a-z]\w*)`", row[2])) for row in group if row] for group in groups
-    ]
-
-
-def defined(path: Path) -> set[str]:
-    """The functions, classes and methods of a file."""
-    nodes = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.ClassDef | ast.FunctionDef)]
-    methods = {
-        f"{node.name}.{inner.name}"
-        for node in nodes
-        if isinstance(node, ast.ClassDef)
-        for inner in node.body
-        if isinstance(inner, ast.FunctionDef)
+def lists() -> dict[str, list[str]]:
+    """What to add -> its steps."""
+    parts = re.split(r"^\*\*([^*]+)\*\*.*$", PARTS, flags=re.M)
+    return {
+        name: re.findall(r"^\d\. (.+)$", text, flags=re.M)
+        for name, text in zip(parts[1::2], parts[2::2], strict=True)
     }
-    return methods | {node.name for node in nodes}
 
 
-def test_each_step_of_the_two_paths_exists_and_neither_is_long() -> None:
-    paths = tables()
-    assert len(paths) == 2
-    for path in paths:
-        assert len(path) <= LONGEST
-        for file, names in path:
-            assert names, file
-            assert set(names) <= defined(REPO / file), file
+def test_each_list_names_files_that_exist() -> None:
+    found = {name for name, steps in lists().items() if steps}
+    assert found == {
+        "A verb",
+        "A tag of a robot's file",
+        "A rule of silence, or of who drives",
+        "A drive",
+        "A message",
+        "An extension",
+    }
+    paths = set(re.findall(r"`((?:\w+/)+[\w.]+|\w+\.(?:toml|yml))`", PAGE))
+    real = {path for path in paths if not PLACEHOLDER.search(path)}
+    assert len(real) > 30
+    assert [path for path in sorted(real) if not (REPO / path).exists()] == []
+
+
+def test_each_name_in_a_step_is_in_a_file_of_that_list() -> None:
+    for what, steps in lists().items():
+        text = "\n".join(steps)
+        files = [
+            REPO / path
+            for path in re.findall(r"`((?:\w+/)+[\w.]+)`", text)
+            if (REPO / path).exists()
+        ]
+        code = "".join(
+            each.read_text()
+            for path in files
+            for each in ([path] if path.is_file() else path.rglob("*.py"))
+        )
+        names = set(re.findall(r"`([A-Za-z_]+)`", text)) - {"check", "urdf", "cli"}
+        assert [name for name in names if not re.search(rf"\b{name}\b", code)] == [], what

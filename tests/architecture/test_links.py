@@ -1,10 +1,17 @@
-"""Each relative link in the documentation leads to a file, and to a heading of it; others have the form of one."""
+"""Each relative link in the documentation leads to a file, and to a heading of it; others have the
+form of one.
+"""
 
 import re
 from pathlib import Path
 
 REPO = Path(__file__).parents[2]
-PAGES = [*REPO.glob("*.md"), *REPO.glob("docs/**/*.md"), *REPO.glob("benchmarks/*.md")]
+PAGES = [
+    *REPO.glob("*.md"),
+    *REPO.glob("docs/**/*.md"),
+    *REPO.glob("benchmarks/*.md"),
+    *REPO.glob("e*/**/README.md"),
+]
 EXTERNAL = re.compile(r"https://[\w-]+(\.[\w-]+)+(/[^\s]*)?")
 
 

@@ -10,14 +10,21 @@ REPO = Path(__file__).parents[2]
 FILES = sorted(REPO.glob("tests/**/*.py"))
 NOT_OURS = {"_set_ros_time_is_active", "_linear", "_replace", "_exit"}
 """Names that rclpy, its messages, namedtuple and os give to what is public."""
-HIDDEN = {"_holozen"}  # the one attribute of a node that is ours and not rclpy's; no script's own has this name
+# the one attribute of a node that is ours and not rclpy's; no script's own has this name
+HIDDEN = {"_holozen"}
 
 
 @cache  # each rule looks at all of them
 def nodes(path: Path) -> list[ast.AST]:
-    """What the rules look at."""
-    looked_at = ast.Import | ast.ImportFrom | ast.Attribute
-    return [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, looked_at)]
+    """What the rules look at. Nothing else is kept: a whole tree takes longer to keep than to
+    make.
+    """
+    return [
+        node
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        or (isinstance(node, ast.Attribute) and is_private(node.attr))
+    ]
 
 
 def is_private(name: str) -> bool:
@@ -37,10 +44,16 @@ def private_names(path: Path) -> Iterator[str]:
 def test_no_test_imports_another() -> None:
     for path in FILES:
         for node in nodes(path):
-            names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
+            names = (
+                [alias.name for alias in node.names]
+                if isinstance(node, ast.Import | ast.ImportFrom)
+                else []
+            )
             module = (node.module or "") if isinstance(node, ast.ImportFrom) else ""
             for name in (*names, module):
-                assert not name.rpartition(".")[2].startswith("test_"), f"{path.relative_to(REPO)} imports {name}"
+                assert not name.rpartition(".")[2].startswith("test_"), (
+                    f"{path.relative_to(REPO)} imports {name}"
+                )
 
 
 def test_no_test_touches_a_private_name() -> None:
@@ -49,7 +62,13 @@ def test_no_test_touches_a_private_name() -> None:
 
 
 def test_no_test_runs_again_after_a_failure() -> None:
-    for name in ("pyproject.toml", "requirements-dev.lock", "scripts/test", ".ci/run", "tests/conftest.py"):
+    for name in (
+        "pyproject.toml",
+        "requirements-dev.lock",
+        "scripts/test",
+        ".ci/run",
+        "tests/conftest.py",
+    ):
         text = (REPO / name).read_text()
         for word in ("rerunfailures", "reruns", "flaky", "--last-failed", "pytest-retry"):
             assert word not in text, f"{name}: {word}"
@@ -59,7 +78,9 @@ COUNTED = re.compile(r"= len\([\w.]+\.(messages|all)\(\)\)|(?<!self)\.(messages|
 
 
 def test_what_is_published_from_now_on_is_known_by_its_time() -> None:
-    """A message that was sent before may arrive later: `record.from_now()` leaves it out, a count does not."""
+    """A message that was sent before may arrive later: `record.from_now()` leaves it out, a count
+    does not.
+    """
     for path in FILES:
         if path.name not in (Path(__file__).name, "robots.py"):  # which have it
             found = COUNTED.search(path.read_text())

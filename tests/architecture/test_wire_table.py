@@ -1,4 +1,6 @@
-"""The one table of the wire agrees with the docstrings of the services and with its page in the docs."""
+"""The one table of the wire agrees with the docstrings of the services and with its page in the
+docs.
+"""
 
 import ast
 import re
@@ -7,14 +9,20 @@ from pathlib import Path
 from holozen import wire
 
 REPO = Path(__file__).parents[2]
-FOLDERS = sorted(path.parent for path in REPO.glob("services/*/__init__.py"))
+FOLDERS = sorted(
+    path.parent
+    for path in (*REPO.glob("services/*/__init__.py"), *REPO.glob("extensions/view/__init__.py"))
+)
+OF_EXTENSIONS = {"view"}  # which may be gone
 HANDS = "keys"  # what a person presses; on no wire
 
 
 def flow(folder: Path) -> tuple[set[str], set[str]]:
     """What a service reads and what it writes or serves, by its docstring `reads -> writes.`"""
     text = ast.get_docstring(ast.parse((folder / "__init__.py").read_text())) or ""
-    assert re.fullmatch(r"[a-z_]+(, [a-z_]+)* -> [a-z_]+(, [a-z_]+)*\.", text), f"{folder.name}: {text!r}"
+    assert re.fullmatch(r"[a-z_]+(, [a-z_]+)* -> [a-z_]+(, [a-z_]+)*\.", text), (
+        f"{folder.name}: {text!r}"
+    )
     left, right = text.removesuffix(".").split(" -> ")
     return set(left.split(", ")), set(right.split(", "))
 
@@ -55,7 +63,7 @@ def test_the_picture_is_closed() -> None:
 
 
 def test_the_table_names_services_that_there_are() -> None:
-    known = {folder.name for folder in FOLDERS}
+    known = {folder.name for folder in FOLDERS} | OF_EXTENSIONS
     named = {name for row in wire.TOPICS for name in (*row.writers, *row.readers)}
     assert named | {row.server for row in (*wire.SERVICES, *wire.ACTIONS)} == known
     assert set(wire.PRIORITY_OF) <= known
@@ -73,8 +81,10 @@ def test_the_table_has_a_row_for_each_key_with_its_types_ends_rate_and_rule() ->
     cells = {row[0].strip("`"): row for row in rows if row and row[0].startswith("`")}
     assert set(cells) == {row.key for row in (*wire.TOPICS, *wire.SERVICES, *wire.ACTIONS)}
     assert cells["cmd_vel"][1:4] == [
-        "geometry_msgs/msg/Twist (TwistStamped accepted)", "teleop, view, controller, anyone -> sim", "20 Hz",
-    ]  # fmt: skip
+        "geometry_msgs/msg/Twist (TwistStamped accepted)",
+        "teleop, view, controller, anyone -> sim",
+        "20 Hz",
+    ]
     assert cells["clock"][2] == "sim -> anyone"
     assert cells["odom"][4] == wire.TOPICS[1].rule
     assert cells["next_goal"][1:3] == ["holozen/srv/NextGoal", "pose_service"]

@@ -1,4 +1,6 @@
-"""The documentation as a site: built strictly, it loads nothing from elsewhere, and its search needs no server."""
+"""The documentation as a site: built strictly, it loads nothing from elsewhere, and its search
+needs no server.
+"""
 
 import subprocess
 import sys
@@ -15,13 +17,24 @@ pytestmark = pytest.mark.needs("chromium")
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("site")
-    words = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(folder)]
+    words = [
+        sys.executable,
+        "-m",
+        "mkdocs",
+        "build",
+        "--strict",
+        "--quiet",
+        "--site-dir",
+        str(folder),
+    ]
     done = subprocess.run(words, cwd=REPO, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stdout + done.stderr
     return folder
 
 
-def test_a_page_from_the_disk_loads_nothing_from_elsewhere_and_finds_words(site: Path, chromium: Browser) -> None:
+def test_a_page_from_the_disk_loads_nothing_from_elsewhere_and_finds_words(
+    site: Path, chromium: Browser
+) -> None:
     page = chromium.new_page()
     requests, errors = list[str](), list[str]()
     page.on("request", lambda request: requests.append(request.url))
@@ -37,3 +50,20 @@ def test_a_page_from_the_disk_loads_nothing_from_elsewhere_and_finds_words(site:
     assert [url for url in requests if not url.startswith("file:")] == []
     assert errors == []
     page.close()
+
+
+def test_copying_a_block_of_a_terminal_takes_its_commands_alone(
+    site: Path, chromium: Browser
+) -> None:
+    context = chromium.new_context(permissions=["clipboard-read", "clipboard-write"])
+    page = context.new_page()
+    page.goto((site / "check.html").as_uri())
+    block = page.locator(".highlight", has_text="holozen check urdf/hb_bot").first
+    block.hover()
+    block.locator("button[data-clipboard-target], .md-code__button").first.click()
+    page.wait_for_selector(".md-dialog--active")
+    assert (
+        page.evaluate("navigator.clipboard.readText()").strip()
+        == "holozen check urdf/hb_bot.urdf.xacro"
+    )
+    context.close()

@@ -21,14 +21,28 @@ SERVICES = ("router", "sim", "pose_service", "controller", "view")
 
 
 class Stack:
-    """Containers and a network called `name`, the router on `port` of this machine's loopback and the view's page on
-    `page`. `files` are compose files besides docker-compose.yml, `env` what they need, `services` what they start.
+    """Containers and a network called `name`, the router on `port` of this machine's loopback and
+    the view's page on `page`. `files` are compose files besides docker-compose.yml, `env` what they
+    need, `services` what they start.
     """
 
-    def __init__(self, image: str, *files: str, services: tuple[str, ...] = SERVICES, **env: str) -> None:
-        self._files = [word for file in ("docker-compose.yml", *files) for word in ("-f", str(ROOT / file))]
-        self.name, self.port, self.page = f"holozen-test-{uuid4().hex[:8]}", free_port(), free_port()
-        self.env = {"HOLOZEN_IMAGE": image, "HOLOZEN_PORT": str(self.port), "HOLOZEN_VIEW_PORT": str(self.page), **env}
+    def __init__(
+        self, image: str, *files: str, services: tuple[str, ...] = SERVICES, **env: str
+    ) -> None:
+        self._files = [
+            word for file in ("docker-compose.yml", *files) for word in ("-f", str(ROOT / file))
+        ]
+        self.name, self.port, self.page = (
+            f"holozen-test-{uuid4().hex[:8]}",
+            free_port(),
+            free_port(),
+        )
+        self.env = {
+            "HOLOZEN_IMAGE": image,
+            "HOLOZEN_PORT": str(self.port),
+            "HOLOZEN_VIEW_PORT": str(self.page),
+            **env,
+        }
         self.services = services
         self._known: dict[str, str] = {}  # the id of each service's container
         self.connection = Connection(mode="client", connect=(f"tcp/127.0.0.1:{self.port}",))
@@ -48,16 +62,27 @@ class Stack:
 
     def wait_until_healthy(self) -> None:
         """Look again when the engine reports a change."""
-        words = ["docker", "events", "--since", f"{time.time():.3f}", "--filter", "event=health_status"]
+        words = [
+            "docker",
+            "events",
+            "--since",
+            f"{time.time():.3f}",
+            "--filter",
+            "event=health_status",
+        ]
         ids, seen = [self.container(service) for service in self.services], -1
-        with Process([*words, "--filter", f"label=com.docker.compose.project={self.name}"]) as events:
+        with Process(
+            [*words, "--filter", f"label=com.docker.compose.project={self.name}"]
+        ) as events:
 
             def healthy() -> bool:
                 nonlocal seen
                 if (count := len(events.out)) == seen:
                     return False
                 seen = count
-                return set(docker("inspect", "--format", "{{.State.Health.Status}}", *ids).split()) == {"healthy"}
+                return set(
+                    docker("inspect", "--format", "{{.State.Health.Status}}", *ids).split()
+                ) == {"healthy"}
 
             wait_for(healthy, within=60, what="healthy containers")
 
@@ -75,14 +100,17 @@ class Stack:
 
     def __exit__(self, *_: object) -> None:
         try:
-            print(*(docker("logs", container) for container in self.containers()), sep="\n")  # shown on failure
+            # shown on failure
+            print(*(docker("logs", container) for container in self.containers()), sep="\n")
         finally:
             self.down()
 
     def container(self, service: str) -> str:
         """The id of a service's container, running or not; a restart leaves it as it is."""
         if service not in self._known:
-            self._known |= dict(row.split() for row in self._list(NAMED, "label=com.docker.compose.oneoff=False"))
+            self._known |= dict(
+                row.split() for row in self._list(NAMED, "label=com.docker.compose.oneoff=False")
+            )
         return self._known[service]
 
     def containers(self) -> list[str]:
@@ -92,14 +120,21 @@ class Stack:
     def inspect(self, *services: str) -> dict[str, Any]:
         """What the engine reports about the containers of these services, or of all."""
         names = services or self.services
-        return dict(zip(names, json.loads(docker("inspect", *map(self.container, names))), strict=True))
+        return dict(
+            zip(names, json.loads(docker("inspect", *map(self.container, names))), strict=True)
+        )
 
     def starts(self, *services: str) -> dict[str, str]:
         """When each of these was started, so that a restart is noticed."""
-        return {service: found["State"]["StartedAt"] for service, found in self.inspect(*services).items()}
+        return {
+            service: found["State"]["StartedAt"]
+            for service, found in self.inspect(*services).items()
+        }
 
     def logs(self, *services: str) -> str:
-        return "\n".join(docker("logs", self.container(service)) for service in services or self.services)
+        return "\n".join(
+            docker("logs", self.container(service)) for service in services or self.services
+        )
 
     def follow(self, service: str, *flags: str) -> Process:
         """Its log, with what is added to it."""
@@ -107,14 +142,22 @@ class Stack:
 
     def complaints(self) -> list[str]:
         """The lines of the logs that should not be there."""
-        return [line for line in self.logs().splitlines() if re.search(r"Traceback|Error|ERROR|WARN|panicked", line)]
+        return [
+            line
+            for line in self.logs().splitlines()
+            if re.search(r"Traceback|Error|ERROR|WARN|panicked", line)
+        ]
 
     def execute(self, service: str, *words: str) -> str:
         """Run a command in a service's container. Returns its output."""
         return docker("exec", self.container(service), *words)
 
     def _list(self, form: str, *filters: str) -> list[str]:
-        words = [word for f in (f"label=com.docker.compose.project={self.name}", *filters) for word in ("--filter", f)]
+        words = [
+            word
+            for f in (f"label=com.docker.compose.project={self.name}", *filters)
+            for word in ("--filter", f)
+        ]
         return docker("ps", "--all", "--no-trunc", "--format", form, *words).splitlines()
 
 
@@ -122,7 +165,10 @@ class Watcher:
     """Odom and cmd_vel_status, as they reach this machine through the router's published port."""
 
     def __init__(self, bus: Bus) -> None:
-        self._odom, self._status = bus.latest("odom", Odometry), bus.latest("cmd_vel_status", CommandStatus)
+        self._odom, self._status = (
+            bus.latest("odom", Odometry),
+            bus.latest("cmd_vel_status", CommandStatus),
+        )
 
     def odom(self) -> Odometry:
         """An odom that arrives after this call."""
@@ -149,10 +195,17 @@ def docker(*words: str) -> str:
 
 
 def run(*words: str, env: dict[str, str] | None = None, within: float = 1500) -> str:
-    """Run a command until it ends. Returns its output, including errors. AssertionError if it fails."""
+    """Run a command until it ends. Returns its output, including errors. AssertionError if it
+    fails.
+    """
     done = subprocess.run(
-        words, env={**os.environ, **(env or {})}, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT, text=True, timeout=within,
-    )  # fmt: skip
+        words,
+        env={**os.environ, **(env or {})},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=within,
+    )
     assert done.returncode == 0, f"{' '.join(words)}: exit code {done.returncode}\n{done.stdout}"
     return done.stdout

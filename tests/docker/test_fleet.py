@@ -1,4 +1,6 @@
-"""deploy/fleet.yml on one machine and on a Swarm: each shard is healthy, and no stop is lost by an update."""
+"""examples/fleet/fleet.yml on one machine and on a Swarm: each shard is healthy, and no stop is
+lost by an update.
+"""
 
 import json
 import os
@@ -14,7 +16,7 @@ from .stack import ROOT, docker, run
 
 pytestmark = [pytest.mark.needs("docker", "docker-compose"), pytest.mark.timeout(1800)]
 
-FILE = str(ROOT / "deploy" / "fleet.yml")
+FILE = str(ROOT / "examples" / "fleet" / "fleet.yml")
 SHARDS = 2
 BOTS = [f"bot{number}" for number in range(6)]
 
@@ -29,7 +31,16 @@ class Fleet:
     def holozen(self, *words: str) -> str:
         """The standard output of a command in the fleet's network."""
         where = ("-e", "HOLOZEN_MODE=client", "-e", "HOLOZEN_CONNECT=tcp/router:7447")
-        words = ("docker", "run", "--rm", "--network", f"{self.name}_fleet", *where, self.image, *words)
+        words = (
+            "docker",
+            "run",
+            "--rm",
+            "--network",
+            f"{self.name}_fleet",
+            *where,
+            self.image,
+            *words,
+        )
         return subprocess.run(words, capture_output=True, text=True, timeout=120).stdout
 
     def health(self) -> list[str]:
@@ -40,13 +51,20 @@ class Fleet:
     def wait(self) -> None:
         """Wait until all are healthy, and all robots are there."""
         wait_for(
-            lambda: self.health() == ["healthy"] * (SHARDS + 3), 180, lambda: f"healthy containers: {self.health()}"
+            lambda: self.health() == ["healthy"] * (SHARDS + 3),
+            180,
+            lambda: f"healthy containers: {self.health()}",
         )
-        wait_for(lambda: [line.split()[0] for line in self.holozen("list").splitlines()] == BOTS, 60)
+        wait_for(
+            lambda: [line.split()[0] for line in self.holozen("list").splitlines()] == BOTS, 60
+        )
 
     def stopped(self) -> list[str]:
         """The names of the sources that stopped each robot."""
-        return [self.holozen("topic", "echo", f"{bot}/cmd_vel_status", "--once", "--field", "stopped") for bot in BOTS]
+        return [
+            self.holozen("topic", "echo", f"{bot}/cmd_vel_status", "--once", "--field", "stopped")
+            for bot in BOTS
+        ]
 
 
 @pytest.fixture

@@ -1,4 +1,6 @@
-"""docker-compose with docker-compose.secure.yml: the robot drives its shape, and only members reach it."""
+"""docker-compose with docker-compose.secure.yml: the robot drives its shape, and only members reach
+it.
+"""
 
 import os
 from collections.abc import Iterator
@@ -6,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from holozen import authority
 from holozen.bus import Bus
 from holozen.messages import TriggerReply, TriggerRequest
+from holozen.secure import authority
 from holozen.testing import wait_for
 from holozen.transport.connection import Connection
 from holozen.transport.errors import BusError, NoReply
@@ -61,7 +63,10 @@ def test_each_container_holds_its_own_key_and_no_rights(stack: Stack) -> None:
     for service, found in stack.inspect().items():
         lines = stack.execute(service, "cat", "/proc/1/status").splitlines()
         status = dict(line.split(":\t", 1) for line in lines)
-        assert int(status["CapEff"], 16) == int(status["CapBnd"], 16) == 0 and "0" not in status["Uid"].split(), service
+        assert (
+            int(status["CapEff"], 16) == int(status["CapBnd"], 16) == 0
+            and "0" not in status["Uid"].split()
+        ), service
         seen = stack.execute(service, "sh", "-c", "ls /secure; touch /secure/x 2>&1 || true")
         assert "key.pem" in seen and "ca.key" not in seen and "Read-only" in seen, service
         sources = {mount["Destination"]: mount["Source"] for mount in found["Mounts"]}

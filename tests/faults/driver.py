@@ -1,10 +1,10 @@
-"""A program that drives a robot at 20 Hz until its end is requested. It prints when it begins to send each command, and
-when it has (s, monotonic).
+"""A program that drives a robot at 20 Hz until its end is requested. It prints when it begins to
+send each command, and when it has (s, monotonic).
 
 python driver.py ENDPOINT [FOLDER]
 
-It is not a lasting node, just like `holozen topic pub`: when it dies the robot stands by the silence alone. With the
-folder of a member it is a node, in the secure set-up.
+It is not a lasting node, just like `holozen topic pub`: when it dies the robot stands by the
+silence alone. With the folder of a member it is a node, in the secure set-up.
 """
 
 import sys

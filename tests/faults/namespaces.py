@@ -1,8 +1,8 @@
-"""Hosts on one machine: network namespaces joined by cables that can be cut, each with a monotonic clock of its own.
+"""Hosts on one machine: network namespaces joined by cables that can be cut, each with a monotonic
+clock of its own.
 
     with Lab() as lab:
-        robot, desk = lab.host("robot"), lab.host("desk", clock=1000)
-        cable = lab.cable(robot, desk)
+        robot, desk = lab.host("robot"), lab.host("desk", clock=1000) cable = lab.cable(robot, desk)
         sim = robot.start(*command("sim", "--listen", f"tcp/{cable.address(robot)}:7447"))
         cable.cut()
 
@@ -22,7 +22,9 @@ NEEDS = pytest.mark.needs("ip", "nsenter", "unshare")
 
 
 class Lab:
-    """Hosts and the cables between them; they end with it. A test is skipped where none can be made."""
+    """Hosts and the cables between them; they end with it. A test is skipped where none can be
+    made.
+    """
 
     def __init__(self) -> None:
         allowed = subprocess.run(["unshare", "-rnT", "true"], capture_output=True, text=True)
@@ -39,14 +41,20 @@ class Lab:
         self._ends.close()
 
     def host(self, name: str, clock: float = 0) -> "Host":
-        """A host with loopback up and nothing else. Its monotonic clock is `clock` seconds ahead of this machine's."""
+        """A host with loopback up and nothing else. Its monotonic clock is `clock` seconds ahead of
+        this machine's.
+        """
         offset = ("--monotonic", f"{clock:.0f}", "--boottime", f"{clock:.0f}") if clock else ()
-        host = Host(name, self._holder(*_enter(self._owner.pid), "unshare", "-nT", *offset), self._ends)
+        host = Host(
+            name, self._holder(*_enter(self._owner.pid), "unshare", "-nT", *offset), self._ends
+        )
         host.check("ip", "link", "set", "lo", "up")
         return host
 
     def cable(self, one: "Host", other: "Host") -> "Cable":
-        """Join two hosts. Each gets one more interface, with an address in a network that only this cable has."""
+        """Join two hosts. Each gets one more interface, with an address in a network that only this
+        cable has.
+        """
         self._cables += 1
         cable = Cable(self._cables, one, other)
         end, far = cable.interface, ("peer", "name", cable.interface, "netns", str(other.pid))
@@ -58,7 +66,9 @@ class Lab:
 
     def _holder(self, *words: str) -> Process:
         """A process that does nothing, in the namespaces that `words` make."""
-        holder = self._ends.enter_context(Process([*words, "sh", "-c", "echo up; exec sleep infinity"]))
+        holder = self._ends.enter_context(
+            Process([*words, "sh", "-c", "echo up; exec sleep infinity"])
+        )
         holder.wait_for_line("up")
         return holder
 
@@ -77,13 +87,19 @@ class Host:
         """Start a program here; it ends with the lab. The options are those of Process."""
         process = self._ends.enter_context(Process(self.inside(*words), **options))
         # pytest shows it on failure
-        self._ends.callback(lambda: print(f"--- {self.name}: {process}\n{process.out}{process.err}"))
+        self._ends.callback(
+            lambda: print(f"--- {self.name}: {process}\n{process.out}{process.err}")
+        )
         return process
 
     def run(self, *words: str, within: float = 30.0) -> subprocess.CompletedProcess[str]:
         """Run a program here until it ends."""
         return subprocess.run(
-            self.inside(*words), stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=within
+            self.inside(*words),
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=within,
         )
 
     def check(self, *words: str) -> str:
@@ -108,8 +124,8 @@ class Cable:
         return f"10.99.{self._number}.{1 + self._hosts.index(host)}"
 
     def cut(self) -> None:
-        """Pull the plug: the first host has no route, the other no carrier. `lose(1)` is a cut that neither end
-        notices.
+        """Pull the plug: the first host has no route, the other no carrier. `lose(1)` is a cut that
+        neither end notices.
         """
         self._hosts[0].check("ip", "link", "set", self.interface, "down")
 
@@ -122,7 +138,10 @@ class Cable:
         for host in self._hosts:
             host.run("nft", "delete", "table", "inet", self.interface)
             some = f"numgen random mod 1000 < {share * 1000:.0f}" if share < 1 else ""
-            chain = f"chain input {{ type filter hook input priority 0; iifname {self.interface} {some} drop; }}"
+            chain = (
+                f"chain input {{ type filter hook input priority 0; iifname {self.interface} "
+                f"{some} drop; }}"
+            )
             host.check("nft", f"table inet {self.interface} {{ {chain}; }}")
 
 

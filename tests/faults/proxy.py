@@ -1,9 +1,11 @@
-"""A TCP link with faults that a test sets while it runs: delay, jitter, a rate limit, a stall, a black hole.
+"""A TCP link with faults that a test sets while it runs: delay, jitter, a rate limit, a stall, a
+black hole.
 
 As a program, for another host: python proxy.py HOST PORT DELAY; it prints its own port on loopback.
 """
 
 import contextlib
+import math
 import random
 import socket
 import sys
@@ -13,29 +15,35 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Self
 
+SEGMENT = 1448  # bytes; of TCP over Ethernet
 CHUNK = 65536  # bytes read at once
 BUFFER = 4 << 20  # bytes that wait in one direction of a connection before its sender is held up
 
 
 @dataclass
 class Faults:
-    """What happens to the bytes of one direction. Each value can be set at any time, for what is sent from then on.
+    """What happens to the bytes of one direction. Each value can be set at any time, for what is
+    sent from then on.
 
-    `delay` and `jitter` are seconds: each chunk takes `delay` and a random part of `jitter`, and none overtakes
-    another, as in TCP. `rate` is in bytes/s; 0 is no limit. `stalled` holds everything back, and delivers it once it
-    is False again. `lost` drops everything: the connections that lose bytes stay silent for ever, as behind a
-    router that has forgotten them, and those opened afterwards work.
+    `delay` and `jitter` are seconds: each chunk takes `delay` and a random part of `jitter`, and
+    none overtakes another, as in TCP. `rate` is in bytes/s; 0 is no limit. `loss` is the part of
+    the segments that is lost: what it hits comes a round trip later, and all behind it waits, as
+    where TCP sends it again at once. `stalled` holds everything back, and delivers it once it is
+    False again. `lost` drops everything: the connections that lose bytes stay silent for ever, as
+    behind a router that has forgotten them, and those opened afterwards work.
     """
 
     delay: float = 0.0
     jitter: float = 0.0
     rate: float = 0.0
+    loss: float = 0.0
     stalled: bool = False
     lost: bool = False
 
 
 class Proxy:
-    """A link from a free loopback port to another: `upstream` is the way to that port, `downstream` the way back.
+    """A link from a free loopback port to another: `upstream` is the way to that port, `downstream`
+    the way back.
 
     A new connection takes a round trip before it carries anything, as TCP's own handshake does.
     """
@@ -57,6 +65,11 @@ class Proxy:
 
     def __exit__(self, *_error: object) -> None:
         self.close()
+
+    @property
+    def carried(self) -> int:
+        """The bytes that came to it so far, both ways."""
+        return sum(way.carried for way in self.ways)
 
     def set(self, **values: float) -> None:
         """Set faults of both directions alike."""
@@ -121,14 +134,23 @@ class Proxy:
 
 
 class _Way:
-    """One direction of one connection: a thread reads and one writes, and what is under way waits between them."""
+    """One direction of one connection: a thread reads and one writes, and what is under way waits
+    between them.
+    """
 
     def __init__(
-        self, source: socket.socket, target: socket.socket, faults: Faults, opened: float, closing: threading.Event
+        self,
+        source: socket.socket,
+        target: socket.socket,
+        faults: Faults,
+        opened: float,
+        closing: threading.Event,
     ) -> None:
         self._source, self._target, self._faults, self._closing = source, target, faults, closing
-        self._waiting: deque[tuple[float, bytes]] = deque()  # when to deliver, and what; b"" is the end
+        # when to deliver, and what; b"" is the end
+        self._waiting: deque[tuple[float, bytes]] = deque()
         self.size = 0  # bytes that wait
+        self.carried = 0  # bytes that came so far
         self._opened = self._due = opened
         self._broken = False
         self._changed = threading.Condition()
@@ -153,9 +175,13 @@ class _Way:
         sent = max(time.monotonic(), self._opened)
         if faults.rate:
             sent = max(sent, self._due - faults.delay) + len(data) / faults.rate
-        self._due = max(self._due, sent + faults.delay + random.uniform(0, faults.jitter))
+        took = faults.delay + random.uniform(0, faults.jitter)
+        if random.random() > (1 - faults.loss) ** math.ceil(len(data) / SEGMENT):
+            took += 2 * faults.delay
+        self._due = max(self._due, sent + took)
         self._waiting.append((self._due, data))
         self.size += len(data)
+        self.carried += len(data)
         self._changed.notify_all()
 
     def write(self) -> None:

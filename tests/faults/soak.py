@@ -1,4 +1,5 @@
-"""Drives, spawns, deletes, cuts, kills, stops and reconnects at random, and checks the whole history afterwards.
+"""Drives, spawns, deletes, cuts, kills, stops and reconnects at random, and checks the whole
+history afterwards.
 
 python -m tests.faults.soak MINUTES [SEED] [--plot FILE]
 
@@ -27,6 +28,7 @@ from holozen.messages import simulation_interfaces as si
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.errors import BusError, ServiceError
 from holozen.transport.samples import Sample, Stamp
+from tests.integration.robots import sent_at
 
 from .history import STEP, History, Violation, whole_lines
 from .proxy import Proxy
@@ -35,16 +37,25 @@ HERE = Path(__file__).parent
 EVERY = 5.0  # s between two figures
 BURST = 40  # robots that come and go in a row
 NAMES = [f"bot{number}" for number in range(8)]
-"""Of spawned robots. Few, since Zenoh keeps each key that it has told over a link until that link ends."""
+"""Of spawned robots. Few, since Zenoh keeps each key that it has told over a link until that link
+ends.
+"""
 BEFORE, AFTER = 2.0, 0.2  # s around a violation that are printed
 BOT = """<robot name="bot"><link name="base"><inertial><mass value="1"/>
 <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
 <collision><geometry><sphere radius="0.1"/></geometry></collision></link>
 <gazebo><plugin name="drive" filename="libgazebo_ros_planar_move.so"/></gazebo></robot>"""
 WRONG = (
-    b"", b"\x00" * 1000, b'{"linear": {"x": NaN}}', b'{"linear": {"x": 1e308}}', b'{"linear": {"x": 5', b"[" * 60_000,
-    b'{"speed": 1}', b"9" * 70_000, b'{"linear": {"x": "fast"}}',
-)  # fmt: skip
+    b"",
+    b"\x00" * 1000,
+    b'{"linear": {"x": NaN}}',
+    b'{"linear": {"x": 1e308}}',
+    b'{"linear": {"x": 5',
+    b"[" * 60_000,
+    b'{"speed": 1}',
+    b"9" * 70_000,
+    b'{"linear": {"x": "fast"}}',
+)
 """Commands that move nothing, and stop nothing either."""
 
 
@@ -79,7 +90,8 @@ class Soak:
         self.names: list[str] = []
         self.acts: list[tuple[float, float, str]] = []  # when each began and ended
         self.restored: list[float] = []  # when the link came back
-        self.passed: list[tuple[float, Stamp]] = []  # when each command came past the sim
+        # when each command came past the sim, and was sent
+        self.passed: list[tuple[float, float, Stamp]] = []
         self.stopped: list[tuple[float, float]] = []  # from the reply of a stop to the release
         self.figures: list[Figures] = []
         self.done: Counter[str] = Counter()
@@ -88,14 +100,29 @@ class Soak:
         self._bus.session.declare_subscriber("cmd_vel", self._pass)
 
     def _pass(self, sample: zenoh.Sample) -> None:
-        if stamp := Sample(sample, 1).stamp:
-            self.passed.append((time.monotonic(), stamp))
+        if stamp := (passed := Sample(sample, 1)).stamp:
+            self.passed.append((time.monotonic(), sent_at(passed), stamp))
 
     def run(self, seconds: float) -> None:
         acts: list[Callable[[], None]] = [
-            self.drive, self.drive, self.drive, self.kill, self.suspend, self.stall, self.lose, self.reset, self.delay,
-            self.stop, self.spawn, self.spawn, self.spawn_many, self.spawn_many, self.delete, self.malform, self.look,
-        ]  # fmt: skip
+            self.drive,
+            self.drive,
+            self.drive,
+            self.kill,
+            self.suspend,
+            self.stall,
+            self.lose,
+            self.reset,
+            self.delay,
+            self.stop,
+            self.spawn,
+            self.spawn,
+            self.spawn_many,
+            self.spawn_many,
+            self.delete,
+            self.malform,
+            self.look,
+        ]
         self.drive()
         wait_for(self._moves, what="motion")  # else a short run may try nothing
         end = time.monotonic() + seconds
@@ -123,7 +150,9 @@ class Soak:
 
     def drive(self) -> None:
         if len(self._alive) < 2:
-            self.drivers.append(Process([sys.executable, str(HERE / "driver.py"), self._proxy.endpoint]))
+            self.drivers.append(
+                Process([sys.executable, str(HERE / "driver.py"), self._proxy.endpoint])
+            )
             time.sleep(self.random.uniform(0.5, 2.0))
 
     def kill(self) -> None:
@@ -144,7 +173,9 @@ class Soak:
         self._proxy.resume()
 
     def lose(self) -> None:
-        """Make connections half-open: whatever was sent is lost, and so is all that follows on them."""
+        """Make connections half-open: whatever was sent is lost, and so is all that follows on
+        them.
+        """
         self._proxy.set(lost=True)
         time.sleep(self.random.uniform(0.1, 1.0))
         self.restored.append(time.monotonic())
@@ -161,7 +192,9 @@ class Soak:
         self._proxy.set(delay=0.0, jitter=0.0)
 
     def stop(self) -> None:
-        """Stop and release the robot. Afterwards only a driver that has let go may drive, so these end."""
+        """Stop and release the robot. Afterwards only a driver that has let go may drive, so these
+        end.
+        """
         self._bus.call("stop", TriggerRequest(), TriggerReply)
         since = time.monotonic()
         time.sleep(self.random.uniform(0.1, 1.0))
@@ -194,15 +227,21 @@ class Soak:
     def delete(self) -> None:
         if self.names:
             name = self.names.pop(self.random.randrange(len(self.names)))
-            self._bus.call("delete_entity", si.DeleteEntityRequest(name), si.DeleteEntityReply, 20.0)
+            self._bus.call(
+                "delete_entity", si.DeleteEntityRequest(name), si.DeleteEntityReply, 20.0
+            )
 
     def malform(self) -> None:
         for payload in self.random.choices(WRONG, k=5):
             self._bus.session.put("cmd_vel", payload, priority=zenoh.Priority.REAL_TIME)
 
     def look(self) -> None:
-        """Check that each request was applied once: what was spawned is there, and what was deleted is not."""
-        found = self._bus.call("get_entities", si.GetEntitiesRequest(), si.GetEntitiesReply, 20.0).entities
+        """Check that each request was applied once: what was spawned is there, and what was deleted
+        is not.
+        """
+        found = self._bus.call(
+            "get_entities", si.GetEntitiesRequest(), si.GetEntitiesReply, 20.0
+        ).entities
         robots = [name for name in found if name.startswith("bot")]
         if sorted(robots) != sorted(self.names):
             self.wrong.append(f"there are {robots}, and should be {self.names}")
@@ -236,25 +275,54 @@ class Soak:
         return history
 
     def story(self, history: History, at: float) -> str:
-        """Everything around a time, in seconds from it: acts, commands sent and passed on, and the odom messages
-        between which the robot starts or stops.
+        """Everything around a time, in seconds from it: acts, commands sent and passed on, and the
+        odom messages between which the robot starts or stops.
         """
         lines = [(began, f"{name}, for {ended - began:.3f} s") for began, ended, name in self.acts]
         lines += [(restored, "the link is back") for restored in self.restored]
-        lines += [(each.began, f"driver {each.driver} sends, and is done after {each.ended - each.began:.4f} s")
-                  for each in history.commands]  # fmt: skip
-        lines += [(came, f"command {stamp.number} of {stamp.session[:6]} comes, sent at {stamp.sent - at:+.4f}, "
-                         f"{came - stamp.sent:.4f} s old") for came, stamp in self.passed]  # fmt: skip
-        lines += [(row.end, f"odom {'moves' if row.moves else 'stands'}, the one before it at {row.begin - at:+.4f}")
-                  for before, row in pairwise(history.odom) if before.moves != row.moves]  # fmt: skip
-        return "\n".join(f"  {when - at:+.4f} {what}" for when, what in sorted(lines) if -BEFORE < when - at < AFTER)
+        lines += [
+            (
+                each.began,
+                f"driver {each.driver} sends, and is done after {each.ended - each.began:.4f} s",
+            )
+            for each in history.commands
+        ]
+        lines += [
+            (
+                came,
+                f"command {stamp.number} of {stamp.session[:6]} comes, sent at "
+                f"{sent - at:+.4f}, "
+                f"{came - sent:.4f} s old",
+            )
+            for came, sent, stamp in self.passed
+        ]
+        lines += [
+            (
+                row.end,
+                f"odom {'moves' if row.moves else 'stands'}, the one before it at "
+                f"{row.begin - at:+.4f}",
+            )
+            for before, row in pairwise(history.odom)
+            if before.moves != row.moves
+        ]
+        return "\n".join(
+            f"  {when - at:+.4f} {what}"
+            for when, what in sorted(lines)
+            if -BEFORE < when - at < AFTER
+        )
 
     def growth(self) -> tuple[float, float, float]:
-        """MB an hour, and the change of threads and descriptors, from the second quarter to the last."""
+        """MB an hour, and the change of threads and descriptors, from the second quarter to the
+        last.
+        """
         quarter = max(1, len(self.figures) // 4)
         early, late = self.figures[quarter : 2 * quarter] or self.figures, self.figures[-quarter:]
-        parts = [Figures(*map(statistics.median, zip(*part, strict=True))) for part in (early, late)]
-        at, memory, threads, descriptors = (after - before for before, after in zip(*parts, strict=True))
+        parts = [
+            Figures(*map(statistics.median, zip(*part, strict=True))) for part in (early, late)
+        ]
+        at, memory, threads, descriptors = (
+            after - before for before, after in zip(*parts, strict=True)
+        )
         return 3600 * memory / max(at, 1.0), threads, descriptors
 
 
@@ -276,7 +344,9 @@ def plot(figures: list[Figures], file: Path) -> None:
     from matplotlib import pyplot
 
     minutes = [(each.at - figures[0].at) / 60 for each in figures]
-    drawing, (memory, counts) = pyplot.subplots(2, sharex=True, figsize=(6, 3.6), layout="constrained")
+    drawing, (memory, counts) = pyplot.subplots(
+        2, sharex=True, figsize=(6, 3.6), layout="constrained"
+    )
     memory.plot(minutes, [each.memory for each in figures], linewidth=1)
     memory.set(ylabel="memory in MB", ylim=0)
     counts.plot(minutes, [each.threads for each in figures], linewidth=1, label="threads")
@@ -295,9 +365,12 @@ def main(minutes: float, seed: int, file: Path | None) -> int:
     print(f"{came}; it moved for {moved:.0f} s")
     print(f"it moved on after the last command for at most {history.longest():.3f} s")
     first, last, (memory, threads, descriptors) = run.figures[0], run.figures[-1], run.growth()
-    print(f"memory {first.memory:.1f} to {last.memory:.1f} MB ({memory:+.1f} MB/h from the second quarter on), "
-          f"threads {first.threads} to {last.threads} ({threads:+g}), "
-          f"descriptors {first.descriptors} to {last.descriptors} ({descriptors:+g})")  # fmt: skip
+    print(
+        f"memory {first.memory:.1f} to {last.memory:.1f} MB ({memory:+.1f} MB/h from the second "
+        "quarter on), "
+        f"threads {first.threads} to {last.threads} ({threads:+g}), "
+        f"descriptors {first.descriptors} to {last.descriptors} ({descriptors:+g})"
+    )
     print(f"{len(run.wrong)} violations", *run.wrong[:20], sep="\n")
     if file:
         plot(run.figures, file)
@@ -308,6 +381,8 @@ if __name__ == "__main__":
     flags = argparse.ArgumentParser("scripts/soak", description=__doc__.splitlines()[0])
     flags.add_argument("minutes", type=float, metavar="MINUTES")
     flags.add_argument("seed", type=int, nargs="?", default=random.randrange(10**6), metavar="SEED")
-    flags.add_argument("--plot", type=Path, metavar="FILE", help="draw memory, threads and descriptors")
+    flags.add_argument(
+        "--plot", type=Path, metavar="FILE", help="draw memory, threads and descriptors"
+    )
     given = flags.parse_args()
     sys.exit(main(given.minutes, given.seed, given.plot))

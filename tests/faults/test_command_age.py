@@ -1,6 +1,8 @@
-"""The age of a command counts from its sending: none that was held up in a slow link, or by a relay, moves a robot.
+"""The age of a command counts from its sending: none that was held up in a slow link, or by a
+relay, moves a robot.
 
-Each side has a monotonic clock of its own. Delays are those of a proxy. `test_cuts.py` has links that are cut.
+Each side has a monotonic clock of its own. Delays are those of a proxy. `test_cuts.py` has links
+that are cut.
 """
 
 import os
@@ -14,6 +16,8 @@ import pytest
 
 from holozen.messages import CommandStatus, Odometry, Twist
 from holozen.testing import Process, Wire, wait_for
+from holozen.testing.process import run
+from holozen.testing.wire import command
 from holozen.transport.samples import Sample
 
 from .history import CLOCK, EACH_STEP, MOVES, History, script, wait_for_motion, wait_for_odom
@@ -22,10 +26,12 @@ from .proxy import Proxy
 
 pytestmark = NEEDS
 
-DELAYS = [(0.4, True), (0.6, False), (2.0, False), (0.1, True)]
-"""Delays of a link in s, one way, one after another; and whether the robot is driven over it."""
+DELAYS = [(0.15, True), (0.4, False), (2.0, False), (0.1, True)]
+"""Delays of a link in s, one way, one after another; and whether the robot is driven over it: a
+command's echo is a round trip old.
+"""
 if os.environ.get("HOLOZEN_LONG") == "1":
-    DELAYS += [(0.2, True), (1.0, False), (0.1, True)]
+    DELAYS += [(0.05, True), (1.0, False), (0.1, True)]
 APART = 0.0001  # m/s between a command and the next
 
 
@@ -35,7 +41,9 @@ class Far:
     def __init__(self, wire: Wire, proxy: Proxy, lab: Lab) -> None:
         self.proxy, self.desk = proxy, lab.host("desk", clock=CLOCK)
         self.observer = Process(script("observer", wire.endpoint))
-        words = [word for word in self.desk.inside(*script("driver", proxy.endpoint)) if word != "-n"]
+        words = [
+            word for word in self.desk.inside(*script("driver", proxy.endpoint)) if word != "-n"
+        ]
         self.driver = Process(words)
 
     def history(self) -> History:
@@ -91,7 +99,9 @@ def test_a_stricter_limit_refuses_what_a_slow_link_brings(far: Far, town: Wire) 
     far.wait_for_motion(time.monotonic())
 
 
-def test_a_link_that_jitters_moves_the_robot_only_by_what_is_fresh(far: Far, trials: Callable[[int, int], int]) -> None:
+def test_a_link_that_jitters_moves_the_robot_only_by_what_is_fresh(
+    far: Far, trials: Callable[[int, int], int]
+) -> None:
     far.proxy.set(delay=0.1, jitter=0.4)
     far.wait_for_odom(time.monotonic() + trials(2, 20))
     far.driver.kill()
@@ -99,10 +109,13 @@ def test_a_link_that_jitters_moves_the_robot_only_by_what_is_fresh(far: Far, tri
     far.history().check_silence()
 
 
-def test_a_link_of_64_kbit_per_second_drives_and_a_slower_one_moves_the_robot_only_by_what_is_fresh(far: Far) -> None:
+def test_a_link_of_64_kbit_per_second_drives_and_a_slower_one_moves_the_robot_only_by_what_is_fresh(
+    far: Far,
+) -> None:
     far.proxy.upstream.rate = 8000  # bytes/s
     far.wait_for_motion(time.monotonic() + 1.0)
-    far.proxy.upstream.rate = 2000  # less than the driver sends, so that its commands wait longer and longer
+    # less than the driver sends, so that its commands wait longer and longer
+    far.proxy.upstream.rate = 2000
     far.wait_for_motion(time.monotonic(), False)
     assert far.driver.returncode is None
     far.driver.kill()
@@ -114,12 +127,16 @@ def test_a_link_of_64_kbit_per_second_drives_and_a_slower_one_moves_the_robot_on
 def test_commands_that_a_relay_reorders_never_go_back(town: Wire) -> None:
     """It holds some back and sends them on in another order, each with the stamp of its sender.
 
-    A speed tells the number of its command. Until a robot has settled, the engine's contacts add some 1e-9 m/s to what
-    is commanded; from then on odom has the command itself.
+    A speed tells the number of its command. Until a robot has settled, the engine's contacts add
+    some 1e-9 m/s to what is commanded; from then on odom has the command itself.
     """
     bus, relay = town.bus("driver"), town.bus("relay")
     commands, waiting = bus.publisher("relayed", Twist), relay.subscribe_raw("relayed")
-    odom, status = bus.subscribe("odom", Odometry, depth=10_000), bus.latest("cmd_vel_status", CommandStatus)
+    commands.echoes = bus.echoes("cmd_vel")  # it commands the robot, by way of the relay
+    odom, status = (
+        bus.subscribe("odom", Odometry, depth=10_000),
+        bus.latest("cmd_vel_status", CommandStatus),
+    )
     steps = count(1)
     speeds: list[float] = []
     wait_for(lambda: commands.matched)
@@ -136,7 +153,9 @@ def test_commands_that_a_relay_reorders_never_go_back(town: Wire) -> None:
     def pass_on(samples: list[Sample]) -> None:
         """Each when some steps have shown what became of the one before."""
         for sample in samples:
-            relay.session.put("cmd_vel", sample.payload, encoding=sample.encoding, attachment=sample.attachment)
+            relay.session.put(
+                "cmd_vel", sample.payload, encoding=sample.encoding, attachment=sample.attachment
+            )
             wait_for(partial(lambda enough: len(seen()) >= enough, len(seen()) + 3), what="odom")
 
     def reordered() -> bool:
@@ -157,3 +176,24 @@ def test_commands_that_a_relay_reorders_never_go_back(town: Wire) -> None:
     pass_on([late] * 3)
     wait_for(lambda: len(seen()) > 20)
     assert max(speeds) < MOVES
+
+
+def test_topic_pub_drives_over_a_link_whose_round_trip_takes_a_quarter_of_a_second(
+    town: Wire,
+) -> None:
+    """Its first command is late, and what it asks about that holds up none that follow."""
+    with Proxy(town.port) as proxy:
+        proxy.set(delay=0.12)
+        words = command(
+            "topic",
+            "pub",
+            "cmd_vel",
+            "{linear: {x: 0.2}}",
+            "--mode",
+            "client",
+            "--connect",
+            proxy.endpoint,
+        )
+        for often in (["--once"], ["-r", "20", "--times", "30"]):
+            drives = partial(run, [*words, *often], 30.0)
+            wait_for(lambda drives=drives: drives().returncode == 0, what=f"motion by {often}")  # type: ignore[misc]

@@ -1,6 +1,7 @@
 """After a cut of the link no command that waited in it moves a robot, even if its sender has died.
 
-Each side has a monotonic clock of its own. Cuts are links that are set down between network namespaces.
+Each side has a monotonic clock of its own. Cuts are links that are set down between network
+namespaces.
 """
 
 import os
@@ -15,7 +16,7 @@ import pytest
 from holozen.testing import Process, wait_for
 from holozen.testing.wire import command, free_port
 
-from .history import CLOCK, EACH_STEP, History, script, wait_for_motion, wait_for_odom
+from .history import CLOCK, EACH_STEP, STAMPS, History, script, wait_for_motion, wait_for_odom
 from .namespaces import NEEDS, Cable, Host, Lab
 
 pytestmark = NEEDS
@@ -36,7 +37,7 @@ class Course:
         port = free_port()
         at = f"tcp/{self.cable.address(self.robot)}:{port}"
         self.endpoint, here = at, f"tcp/127.0.0.1:{port}"
-        words = command("sim", "--listen", f"tcp/0.0.0.0:{port}", "--connect", here)
+        words = command("sim", "--listen", f"tcp/0.0.0.0:{port}", "--connect", here, *STAMPS)
         self.robot.start(*words).wait_for_line("listens on cmd_vel")
         self.robot.check(*command(*EACH_STEP, "--connect", here))
         self.observer = self.robot.start(*script("observer", here))
@@ -102,8 +103,12 @@ def test_after_a_cut_nothing_that_waited_moves_the_robot(course: Course, fate: s
 
 @pytest.mark.needs("nft")
 @pytest.mark.parametrize("fate", ["alive", "killed"])
-def test_after_a_cut_that_neither_end_sees_nothing_moves_the_robot_either(course: Course, fate: str) -> None:
-    """Packets are dropped both ways: links stay half-open, and no end of a process comes through."""
+def test_after_a_cut_that_neither_end_sees_nothing_moves_the_robot_either(
+    course: Course, fate: str
+) -> None:
+    """Packets are dropped both ways: links stay half-open, and no end of a process comes
+    through.
+    """
     driver = course.drive()
     course.cable.lose(1.0)
     began = time.monotonic()
@@ -127,7 +132,9 @@ def test_where_a_third_of_the_packets_is_lost_nothing_old_moves_the_robot(course
     driver = course.drive()
     began, before = time.monotonic(), sent_again(course.desk)
     course.cable.lose(0.3)
-    wait_for(lambda: sent_again(course.desk) > before + 5, 30.0, "packets that were lost and sent again")
+    wait_for(
+        lambda: sent_again(course.desk) > before + 5, 30.0, "packets that were lost and sent again"
+    )
     driver.kill()
     course.cable.lose(0.0)
     wait_for_odom(course.observer, time.monotonic() + 1.0)

@@ -12,7 +12,10 @@ from .namespaces import NEEDS, Host, Lab
 
 pytestmark = NEEDS
 
-RISK = "open to the network: anyone who can reach it can drive, stop and delete robots, and set parameters"
+RISK = (
+    "open to the network: anyone who can reach it can drive, stop and delete robots, and set "
+    "parameters"
+)
 LOOPBACK = ("--listen", "tcp/127.0.0.1:7447", "--connect", "tcp/127.0.0.1:7447")
 
 
@@ -26,7 +29,9 @@ def found_by_the_doctor(host: Host) -> list[dict[str, str]]:
     return [row for row in rows if row["check"] == "network"]
 
 
-def test_a_sim_that_listens_beyond_loopback_warns_and_the_doctor_finds_it(lab: Lab, host: Host) -> None:
+def test_a_sim_that_listens_beyond_loopback_warns_and_the_doctor_finds_it(
+    lab: Lab, host: Host
+) -> None:
     lab.cable(host, lab.host("desk"))
     for listen in ("udp/10.99.1.1:7447", "tcp/[::]:7447"):
         sim = host.start(*command("sim", "--listen", listen))
@@ -49,12 +54,23 @@ def test_a_sim_on_loopback_prints_no_network_warning(host: Host, flags: tuple[st
 
 
 @pytest.mark.parametrize("way", ["config", "cfg"])
-def test_a_router_reports_where_a_configuration_has_it_listen(host: Host, tmp_path: Path, way: str) -> None:
+def test_a_router_reports_where_a_configuration_has_it_listen(
+    host: Host, tmp_path: Path, way: str
+) -> None:
     path = tmp_path / "router.json5"
-    path.write_text('{mode: "router", listen: {endpoints: ["tcp/127.0.0.1:7450", "tcp/0.0.0.0:7451"]}}')
-    flags = ["--config", str(path)] if way == "config" else ["--cfg", 'listen/endpoints:["tcp/0.0.0.0:7451"]']
+    path.write_text(
+        '{mode: "router", listen: {endpoints: ["tcp/127.0.0.1:7450", "tcp/0.0.0.0:7451"]}}'
+    )
+    flags = (
+        ["--config", str(path)]
+        if way == "config"
+        else ["--cfg", 'listen/endpoints:["tcp/0.0.0.0:7451"]']
+    )
     router = host.start(*command("router", *flags))
-    assert router.wait_for_line("open to the network") == f"router: listens at tcp/0.0.0.0:7451, {RISK}"
+    assert (
+        router.wait_for_line("open to the network")
+        == f"router: listens at tcp/0.0.0.0:7451, {RISK}"
+    )
     both = {"config": "tcp/127.0.0.1:7450, tcp/0.0.0.0:7451", "cfg": "tcp/0.0.0.0:7451"}[way]
     wait_for(lambda: f"router: listens at {both}\n" in router.err)
 
@@ -63,7 +79,9 @@ def test_zenohs_own_default_is_open(host: Host, tmp_path: Path) -> None:
     path = tmp_path / "empty.json5"
     path.write_text("{}")
     router = host.start(*command("router", "--config", str(path)))
-    assert router.wait_for_line("open to the network") == f"router: listens at tcp/[::]:7447, {RISK}"
+    assert (
+        router.wait_for_line("open to the network") == f"router: listens at tcp/[::]:7447, {RISK}"
+    )
 
 
 def test_a_router_with_passwords_does_not_warn(host: Host, tmp_path: Path) -> None:

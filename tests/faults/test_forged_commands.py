@@ -9,7 +9,12 @@ import zenoh
 
 from holozen.bus import Bus
 from holozen.messages import CommandStatus, Twist
-from holozen.messages.rcl_interfaces import Parameter, ParameterValue, SetParametersReply, SetParametersRequest
+from holozen.messages.rcl_interfaces import (
+    Parameter,
+    ParameterValue,
+    SetParametersReply,
+    SetParametersRequest,
+)
 from holozen.testing import Wire, wait_for
 
 NAMES = 1200
@@ -39,7 +44,8 @@ class Person:
 def statuses(wire: Wire) -> Iterator["Statuses"]:
     wire.start("sim").wait_for_line("listens on cmd_vel")
     bus = wire.bus()
-    longer = Parameter("command_timeout", ParameterValue.of(2.0))  # for a person's thread on a busy machine
+    # for a person's thread on a busy machine
+    longer = Parameter("command_timeout", ParameterValue.of(2.0))
     reported = bus.call("sim/set_parameters", SetParametersRequest([longer]), SetParametersReply)
     assert reported.results[0].successful, reported
     yield Statuses(bus)
@@ -61,20 +67,26 @@ class Statuses:
         return wait_for(newer) or CommandStatus()
 
     def wait_for(self, source: str) -> None:
-        wait_for(lambda: self.next().obeyed == source, what=lambda: f"{source} to drive; {self.next()}")
+        wait_for(
+            lambda: self.next().obeyed == source, what=lambda: f"{source} to drive; {self.next()}"
+        )
 
 
 def forge(bus: Bus, payload: str, names: int, priority: zenoh.Priority) -> None:
-    """Publish forged commands, fast, but not so fast that the sim misses most of them: it reads the newest 64 between
-    two steps.
+    """Publish forged commands, fast, but not so fast that the sim misses most of them: it reads the
+    newest 64 between two steps.
     """
     for number in range(names):
         time.sleep(0.02 * (number % 30 == 29))
-        bus.session.put("cmd_vel", payload, attachment=f"forged{number}@{number:06x}", priority=priority)
+        bus.session.put(
+            "cmd_vel", payload, attachment=f"forged{number}@{number:06x}", priority=priority
+        )
 
 
 @pytest.mark.parametrize("payload", ['{"linear": {"x": -1}}', "{}"], ids=["go back", "stop"])
-def test_a_flood_of_names_at_the_lowest_priority_holds_no_person(wire: Wire, statuses: Statuses, payload: str) -> None:
+def test_a_flood_of_names_at_the_lowest_priority_holds_no_person(
+    wire: Wire, statuses: Statuses, payload: str
+) -> None:
     person = Person(wire.bus("teleop", lasting=True))
     try:
         statuses.wait_for(person.source)
@@ -96,8 +108,12 @@ def test_a_flood_of_names_at_the_lowest_priority_holds_no_person(wire: Wire, sta
         another.let_go()
 
 
-@pytest.mark.parametrize("twist", ['{"linear": {"x": 1.5e308, "y": 1.5e308}}', '{"linear": {"x": 1e308}}'])
-def test_what_no_robot_can_mean_neither_stops_nor_moves_it(wire: Wire, statuses: Statuses, twist: str) -> None:
+@pytest.mark.parametrize(
+    "twist", ['{"linear": {"x": 1.5e308, "y": 1.5e308}}', '{"linear": {"x": 1e308}}']
+)
+def test_what_no_robot_can_mean_neither_stops_nor_moves_it(
+    wire: Wire, statuses: Statuses, twist: str
+) -> None:
     person = Person(wire.bus("teleop", lasting=True))
     try:
         statuses.wait_for(person.source)

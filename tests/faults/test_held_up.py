@@ -1,4 +1,6 @@
-"""Processes that a busy machine holds up for a while know of each other afterwards, and hear each other."""
+"""Processes that a busy machine holds up for a while know of each other afterwards, and hear each
+other.
+"""
 
 import contextlib
 import random
@@ -17,7 +19,9 @@ from holozen.transport.errors import ServiceError
 PEERS = 5
 
 
-def test_processes_that_are_held_up_for_seconds_stay_linked(wire: Wire, trials: Callable[[int, int], int]) -> None:
+def test_processes_that_are_held_up_for_seconds_stay_linked(
+    wire: Wire, trials: Callable[[int, int], int]
+) -> None:
     """A link that is lost has to be made again, which Zenoh may fail to do."""
     held_up = [wire.start("sim"), wire.start("pose-service")]
     bus = wire.bus()
@@ -50,7 +54,9 @@ def test_of_two_peers_only_one_connects(wire: Wire) -> None:
     with ExitStack() as ends, ThreadPoolExecutor() as pool:
         opened = [pool.submit(Bus, f"peer{n}", wire.connection, lasting=True) for n in range(PEERS)]
         buses = [ends.enter_context(each.result()) for each in opened]
-        wait_for(lambda: all(len(links(bus)) >= PEERS - 1 for bus in buses), 20, "links between all")
+        wait_for(
+            lambda: all(len(links(bus)) >= PEERS - 1 for bus in buses), 20, "links between all"
+        )
         assert all(set(links(bus).values()) == {1} for bus in buses)
 
 

@@ -1,4 +1,6 @@
-"""What the checks of a history let pass, and what they find: a robot that stands, and a link that is cut."""
+"""What the checks of a history let pass, and what they find: a robot that stands, and a link that
+is cut.
+"""
 
 import pytest
 
@@ -52,4 +54,6 @@ def test_a_robot_moves_on_for_half_a_second_after_the_newest_of_all_commands() -
     until = CUT + 0.3 + COMMAND_SILENCE
     history(held_up, command(CUT + 0.1), starts=CUT + 0.01, stands=until).check_silence()
     with pytest.raises(Violation, match="after the last command"):
-        history(held_up, command(CUT + 0.1), starts=CUT + 0.01, stands=until + 4 * STEP).check_silence()
+        history(
+            held_up, command(CUT + 0.1), starts=CUT + 0.01, stands=until + 4 * STEP
+        ).check_silence()

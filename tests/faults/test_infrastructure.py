@@ -71,7 +71,9 @@ def test_a_delay_is_one_way(link: Proxy, echo: Echo) -> None:
     assert time.monotonic() - begin >= 1.0
 
 
-def test_a_connection_over_a_slow_link_takes_a_round_trip_to_open(link: Proxy, listener: socket.socket) -> None:
+def test_a_connection_over_a_slow_link_takes_a_round_trip_to_open(
+    link: Proxy, listener: socket.socket
+) -> None:
     link.set(delay=0.3)
     begin = time.monotonic()
     echo = Echo(link, listener)
@@ -91,6 +93,11 @@ def test_jitter_varies_the_delay_and_keeps_the_order(link: Proxy, echo: Echo) ->
     while len(got) < 100:
         got += echo.far.recv(100)
     assert got == bytes(range(100))
+
+
+def test_what_is_lost_comes_a_round_trip_later(link: Proxy, echo: Echo) -> None:
+    link.upstream.delay, link.upstream.loss = 0.1, 1.0
+    assert echo.carries() >= 0.29
 
 
 def test_a_rate_limits(link: Proxy, echo: Echo) -> None:
@@ -167,7 +174,9 @@ def pings(hosts: tuple[Host, Host], cable: Cable, count: int = 3) -> int:
 
 
 @NEEDS
-def test_a_cable_carries_until_it_is_cut_and_again_when_it_is_joined(hosts: tuple[Host, Host], cable: Cable) -> None:
+def test_a_cable_carries_until_it_is_cut_and_again_when_it_is_joined(
+    hosts: tuple[Host, Host], cable: Cable
+) -> None:
     hosts[1].start(sys.executable, "-c", ANSWER, cable.address(hosts[1])).wait_for_line("up")
     assert pings(hosts, cable) == 3
     cable.cut()
@@ -192,7 +201,9 @@ CLOCKS = "import time; print(time.monotonic(), time.time())"
 
 
 @NEEDS
-def test_each_host_has_a_monotonic_clock_of_its_own_and_the_time_of_day_of_all(hosts: tuple[Host, Host]) -> None:
+def test_each_host_has_a_monotonic_clock_of_its_own_and_the_time_of_day_of_all(
+    hosts: tuple[Host, Host],
+) -> None:
     clocks = [hosts[0], hosts[1]]
     (mono, day), (other_mono, other_day) = (
         map(float, host.check(sys.executable, "-c", CLOCKS).split()) for host in clocks

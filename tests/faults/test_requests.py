@@ -1,4 +1,6 @@
-"""A request is applied once, or its caller learns that it was not: its service dies, its reply is lost, many wait."""
+"""A request is applied once, or its caller learns that it was not: its service dies, its reply is
+lost, many wait.
+"""
 
 import os
 import sys
@@ -72,7 +74,9 @@ def test_a_slow_service_is_given_up_by_who_waits_no_longer_and_delays_no_other(w
         assert patient.result() == TriggerReply(True)
 
 
-def test_a_robot_stands_while_its_next_goal_is_slow_to_come_and_then_drives_there(wire: Wire) -> None:
+def test_a_robot_stands_while_its_next_goal_is_slow_to_come_and_then_drives_there(
+    wire: Wire,
+) -> None:
     asked, go = list[int](), threading.Event()
 
     def answer(request: NextGoalRequest) -> NextGoalReply:
@@ -81,7 +85,10 @@ def test_a_robot_stands_while_its_next_goal_is_slow_to_come_and_then_drives_ther
         return NextGoalReply(0.3, 0.0, 0.0, 1)
 
     bus = wire.bus("pose_service", lasting=True)
-    server, odom = bus.serve("next_goal", NextGoalRequest, NextGoalReply, answer), bus.latest("odom", Odometry)
+    server, odom = (
+        bus.serve("next_goal", NextGoalRequest, NextGoalReply, answer),
+        bus.latest("odom", Odometry),
+    )
     wire.start("sim").wait_for_line("listens on")
     controller = wire.start("controller", "--laps", "1")
     server.start()
@@ -94,7 +101,9 @@ def test_a_robot_stands_while_its_next_goal_is_slow_to_come_and_then_drives_ther
     wait_for(lambda: (now := odom.read()[0]) and abs(now.pose.pose.position.x - 0.3) < 0.05)
 
 
-def test_a_request_whose_reply_is_lost_is_applied_once_and_its_caller_gets_the_reply(wire: Wire, proxy: Proxy) -> None:
+def test_a_request_whose_reply_is_lost_is_applied_once_and_its_caller_gets_the_reply(
+    wire: Wire, proxy: Proxy
+) -> None:
     applied: list[int] = []
 
     def apply(_request: TriggerRequest) -> TriggerReply:
@@ -106,7 +115,10 @@ def test_a_request_whose_reply_is_lost_is_applied_once_and_its_caller_gets_the_r
 
     server = wire.bus("server", lasting=True)
     server.serve("count", TriggerRequest, TriggerReply, apply).start()
-    with Bus("caller", Connection("client", connect=(proxy.endpoint,))) as caller, ThreadPoolExecutor() as pool:
+    with (
+        Bus("caller", Connection("client", connect=(proxy.endpoint,))) as caller,
+        ThreadPoolExecutor() as pool,
+    ):
         wait_for(caller.served("count"))
         links = caller.session.info.links()
         asked = pool.submit(caller.call, "count", TriggerRequest(), TriggerReply, 20.0)
@@ -118,7 +130,9 @@ def test_a_request_whose_reply_is_lost_is_applied_once_and_its_caller_gets_the_r
     assert applied == [0, 1]
 
 
-def test_of_more_requests_than_can_wait_each_is_answered_or_ends_without_a_reply(wire: Wire) -> None:
+def test_of_more_requests_than_can_wait_each_is_answered_or_ends_without_a_reply(
+    wire: Wire,
+) -> None:
     answered: list[TriggerRequest] = []
 
     def answer(request: TriggerRequest) -> TriggerReply:
@@ -131,7 +145,11 @@ def test_of_more_requests_than_can_wait_each_is_answered_or_ends_without_a_reply
         wait_for(caller.served("count"))
         asked = [caller.ask("count", 60.0) for _ in range(RING + more)]
         last = caller.ask("count", 60.0)
-        wait_for(lambda: sum(_has_ended(replies) for replies in asked[:more]) == more, 60, "the oldest to be dropped")
+        wait_for(
+            lambda: sum(_has_ended(replies) for replies in asked[:more]) == more,
+            60,
+            "the oldest to be dropped",
+        )
         server.start()
         outcomes = [list(replies) for replies in (*asked[more:], last)]
         busy = sum(isinstance(replies[0], bytes) for replies in outcomes if replies)

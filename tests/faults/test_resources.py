@@ -1,4 +1,6 @@
-"""A sim that runs out of descriptors goes on: it obeys who drives, and others once there is room again."""
+"""A sim that runs out of descriptors goes on: it obeys who drives, and others once there is room
+again.
+"""
 
 import json
 import sys
@@ -21,8 +23,16 @@ while True:
 """
 
 
-def test_a_sim_without_a_free_descriptor_obeys_its_driver_and_takes_others_later(wire: Wire) -> None:
-    limited = ["sh", "-c", f'ulimit -n {DESCRIPTORS}; exec "$@"', "sh", *command("sim", *wire.flags)]
+def test_a_sim_without_a_free_descriptor_obeys_its_driver_and_takes_others_later(
+    wire: Wire,
+) -> None:
+    limited = [
+        "sh",
+        "-c",
+        f'ulimit -n {DESCRIPTORS}; exec "$@"',
+        "sh",
+        *command("sim", *wire.flags),
+    ]
     with Process(limited) as sim:
         sim.wait_for_line("listens on cmd_vel")
         bus = wire.bus("driver", lasting=True)
@@ -40,12 +50,20 @@ def test_a_sim_without_a_free_descriptor_obeys_its_driver_and_takes_others_later
         wait_for(lambda: drives(0.3), 20)
         before = descriptors()
         with Process([sys.executable, "-c", CROWD, str(wire.port)]) as crowd:
-            wait_for(lambda: descriptors() >= DESCRIPTORS, 30, lambda: f"no free descriptor; {descriptors()} are open")
+            wait_for(
+                lambda: descriptors() >= DESCRIPTORS,
+                30,
+                lambda: f"no free descriptor; {descriptors()} are open",
+            )
             wait_for(lambda: drives(0.2), 20, "the robot to be driven on")
             assert crowd.returncode is None
             assert bus.call("stop", TriggerRequest(), TriggerReply, 20.0).success
             wait_for(lambda: drives(0.0), 20, "the robot to stand")
-        wait_for(lambda: descriptors() <= before + 5, 30, lambda: f"free descriptors; {descriptors()} are open")
+        wait_for(
+            lambda: descriptors() <= before + 5,
+            30,
+            lambda: f"free descriptors; {descriptors()} are open",
+        )
         rows = wire.run("list", "--json").stdout.splitlines()
         assert [json.loads(row)["name"] for row in rows] == ["hb_bot"]
         assert sim.returncode is None

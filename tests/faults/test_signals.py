@@ -1,4 +1,6 @@
-"""Random signals in any state of any process: each ends on SIGTERM afterwards, quietly, and leaves nothing behind."""
+"""Random signals in any state of any process: each ends on SIGTERM afterwards, quietly, and leaves
+nothing behind.
+"""
 
 import contextlib
 import random
@@ -13,15 +15,29 @@ from holozen.messages import Odometry
 from holozen.testing import Process, Terminal, Wire, wait_for
 
 ENDS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
-OTHERS = [signal.SIGTSTP, signal.SIGCONT, signal.SIGWINCH, signal.SIGCHLD, signal.SIGPIPE, signal.SIGSTOP]
+OTHERS = [
+    signal.SIGTSTP,
+    signal.SIGCONT,
+    signal.SIGWINCH,
+    signal.SIGCHLD,
+    signal.SIGPIPE,
+    signal.SIGSTOP,
+]
 DEADLY = [signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM, signal.SIGKILL, signal.SIGQUIT]
 """Those that end any program that does not expect them."""
 
 ROOT = Path(__file__).parents[2]
 VERBS = [
-    ["sim"], ["pose-service"], ["controller"], ["router"], ["topic", "echo", "odom"], ["topic", "pub", "cmd_vel", "{}"],
-    ["record", "odom"], ["stop"], ["node", "list"],
-]  # fmt: skip
+    ["sim"],
+    ["pose-service"],
+    ["controller"],
+    ["router"],
+    ["topic", "echo", "odom"],
+    ["topic", "pub", "cmd_vel", "{}"],
+    ["record", "odom"],
+    ["stop"],
+    ["node", "list"],
+]
 
 
 def harass(process: Process, chance: random.Random, deadly: bool) -> list[int]:
@@ -61,7 +77,13 @@ def test_random_signals_leave_no_process_no_traceback_and_no_shared_memory(
                 used |= shared_memory(process)
                 process.signal(signal.SIGTERM)
                 what = f"seed {seed}, trial {trial}: {' '.join(verb)}, signals {sent}"
-                assert process.wait(20) in {0, 1, 130, -signal.SIGTERM, *(-number for number in sent)}, what
+                assert process.wait(20) in {
+                    0,
+                    1,
+                    130,
+                    -signal.SIGTERM,
+                    *(-number for number in sent),
+                }, what
                 assert not shows_traceback(process.err), f"{what}: {process.err}"
     count = odom.count
     wait_for(lambda: odom.count > count + 20, 20, "odom of the sim that got no signal")
@@ -84,19 +106,29 @@ def test_random_signals_leave_a_tidy_terminal_and_a_robot_that_stands(
             used |= shared_memory(terminal.process)
             terminal.process.signal(signal.SIGTERM)
             what = f"seed {seed}, trial {trial}: {sent}"
-            assert terminal.process.wait(20) in {0, 1, 130, -signal.SIGTERM, *(-number for number in sent)}, (
-                f"{what}: {terminal.raw}"
-            )
+            assert terminal.process.wait(20) in {
+                0,
+                1,
+                130,
+                -signal.SIGTERM,
+                *(-number for number in sent),
+            }, f"{what}: {terminal.raw}"
             assert not shows_traceback(terminal.raw), f"{what}: {terminal.raw}"
             assert terminal.modes() == terminal.modes_before, what
             assert_tidy(terminal, what)
         count = odom.count
-        wait_for(lambda count=count: odom.count > count + 5 and stands(odom.read()[0]), 20, f"{what}: rest")  # type: ignore[misc]
+        wait_for(
+            lambda count=count: odom.count > count + 5 and stands(odom.read()[0]),  # type: ignore[misc]
+            20,
+            f"{what}: rest",
+        )
     assert not [path for path in used if path.exists()], f"seed {seed}"
 
 
 def shows_traceback(text: str) -> bool:
-    """Whether a text holds a traceback of our own code. Python itself shows one on Ctrl-C while it starts."""
+    """Whether a text holds a traceback of our own code. Python itself shows one on Ctrl-C while it
+    starts.
+    """
     traceback = text.partition("Traceback")[2]
     return any(f"{ROOT}/{folder}/" in traceback for folder in ("holozen", "services"))
 
@@ -106,6 +138,10 @@ def stands(odom: Odometry | None) -> bool:
 
 
 def assert_tidy(terminal: Terminal, what: str) -> None:
-    """Check that everything switched on is off again: the alternate screen, the hidden cursor, bracketed paste."""
+    """Check that everything switched on is off again: the alternate screen, the hidden cursor,
+    bracketed paste.
+    """
     for on, off in (("1049h", "1049l"), ("25l", "25h"), ("2004h", "2004l")):
-        assert terminal.raw.rfind(f"\x1b[?{on}") <= terminal.raw.rfind(f"\x1b[?{off}"), f"{what}: {on}"
+        assert terminal.raw.rfind(f"\x1b[?{on}") <= terminal.raw.rfind(f"\x1b[?{off}"), (
+            f"{what}: {on}"
+        )

@@ -15,6 +15,6 @@ def test_a_soak_breaks_no_promise() -> None:
     run, _ = soak(MINUTES, seed := int.from_bytes(os.urandom(3)))
     assert run.wrong == [], f"seed {seed}"
     memory, threads, descriptors = run.growth()
-    print(f"memory {memory:+.1f} MB/h, see docs/safety.md")
+    print(f"memory {memory:+.1f} MB/h, see docs/evidence.md")
     if LONG:
         assert abs(threads) < 5 and abs(descriptors) < 10, run.figures

@@ -9,9 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from holozen import data
 from holozen.bus import Bus
-from holozen.robot.xacro import expand_xacro
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.graph import ALL_NODE_INFO
 
@@ -21,21 +19,33 @@ pytestmark = pytest.mark.needs("faketime")
 
 HERE = Path(__file__).parent
 HOUR = 3600.0
+SLEEP = """
+import threading, time
+pause = threading.Event()
+time.sleep = lambda seconds: pause.wait(seconds) and None
+"""
+"""Under faketime Python's own time.sleep fails."""
 
 
 class Clock:
     """The time of day of one process, by Debian's faketime; its monotonic clock stays."""
 
-    def __init__(self, file: Path) -> None:
-        self._file = file
+    def __init__(self, folder: Path) -> None:
+        self._file = file = folder / "clock"
         self.set(0.0)
+        (folder / "sitecustomize.py").write_text(SLEEP)
         asked = subprocess.run(
-            ["faketime", "-m", "-f", "+0", "sh", "-c", "echo $LD_PRELOAD"], capture_output=True, text=True
+            ["faketime", "-m", "-f", "+0", "sh", "-c", "echo $LD_PRELOAD"],
+            capture_output=True,
+            text=True,
         )
         self.env = {
-            "LD_PRELOAD": asked.stdout.strip(), "FAKETIME_TIMESTAMP_FILE": str(file), "FAKETIME_NO_CACHE": "1",
+            "LD_PRELOAD": asked.stdout.strip(),
+            "FAKETIME_TIMESTAMP_FILE": str(file),
+            "FAKETIME_NO_CACHE": "1",
             "FAKETIME_DONT_FAKE_MONOTONIC": "1",
-        }  # fmt: skip
+            "PYTHONPATH": str(folder),
+        }
 
     def set(self, ahead: float) -> None:
         """Set the clock so many seconds ahead of this machine's."""
@@ -46,15 +56,12 @@ class Clock:
 
 @pytest.fixture
 def clock(tmp_path: Path) -> Clock:
-    return Clock(tmp_path / "clock")
+    return Clock(tmp_path)
 
 
 @pytest.fixture
-def observer(wire: Wire, clock: Clock, tmp_path: Path) -> Iterator[Process]:
-    # Under faketime Python's time.sleep fails, which the sim calls only while a xacro file is expanded.
-    robot = tmp_path / "hb_bot.urdf"
-    robot.write_text(expand_xacro(data.find("urdf", "hb_bot.urdf.xacro")))
-    wire.start("sim", "--robot", str(robot), env=clock.env).wait_for_line("listens on cmd_vel", 60)
+def observer(wire: Wire, clock: Clock) -> Iterator[Process]:
+    wire.start("sim", env=clock.env).wait_for_line("listens on cmd_vel", 60)
     assert wire.run("param", "set", "sim", "odometry_rate", f"{1 / STEP:g}").returncode == 0
     with Process([sys.executable, str(HERE / "observer.py"), wire.endpoint]) as observer:
         yield observer

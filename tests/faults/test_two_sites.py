@@ -1,4 +1,6 @@
-"""Two sites, each with a router, over a link of 100 ms that loses packets; deploy/site.json5 says what crosses it."""
+"""Two sites, each with a router, over a slow link that loses packets: what
+examples/fleet/site.json5 lets cross it.
+"""
 
 import sys
 import time
@@ -11,14 +13,14 @@ from holozen.testing import Process
 from holozen.testing.wire import command, free_port
 from tests.built import built, needs
 
-from .history import CLOCK, EACH_STEP, History, script, wait_for_motion, wait_for_odom
+from .history import CLOCK, EACH_STEP, STAMPS, History, script, wait_for_motion, wait_for_odom
 from .namespaces import NEEDS, Lab
 
 pytestmark = [NEEDS]
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
-SITE = ROOT / "deploy" / "site.json5"
+SITE = ROOT / "examples" / "fleet" / "site.json5"
 ZENOHD = built("zenohd")
 DELAY = 0.1  # s, one way
 CLIENT = ("--mode", "client", "--connect")
@@ -30,7 +32,9 @@ def router(request: pytest.FixtureRequest) -> Callable[..., Process]:
     if request.param != "zenohd":
         return lambda host, *words: listening(host.start(*command("router", *words)), "listens at")
     needs(ZENOHD, "zenohd")
-    return lambda host, *words: listening(host.start(str(ZENOHD), "--no-multicast-scouting", *words), "reached at")
+    return lambda host, *words: listening(
+        host.start(str(ZENOHD), "--no-multicast-scouting", *words), "reached at"
+    )
 
 
 def listening(process: Process, line: str) -> Process:
@@ -46,18 +50,24 @@ def test_robots_stand_when_the_link_is_cut_and_only_fresh_commands_move_them_aft
     config, here = tmp_path / "site.json5", f"tcp/127.0.0.1:{port}"
     config.write_text(SITE.read_text().replace("wan0", cable.interface))
     router(robot, "--config", str(config), "--listen", f"tcp/0.0.0.0:{port}")
-    robot.start(*command("sim", *CLIENT, here)).wait_for_line("listens on cmd_vel")
+    robot.start(*command("sim", *CLIENT, here, *STAMPS)).wait_for_line("listens on cmd_vel")
     robot.check(*command(*EACH_STEP, *CLIENT, here))
     observer = robot.start(*script("observer", here))
-    link = desk.start(sys.executable, str(HERE / "proxy.py"), cable.address(robot), str(port), str(DELAY))
+    link = desk.start(
+        sys.executable, str(HERE / "proxy.py"), cable.address(robot), str(port), str(DELAY)
+    )
     there = f"tcp/127.0.0.1:{link.wait_for_line('port').split()[1]}"
     router(desk, "--listen", here, "--connect", there)
     driver = desk.start(*script("driver", here))
 
     wait_for_motion(observer, 0.0)
-    rate = desk.start(*command("topic", "hz", "odom", "--window", "5", *CLIENT, here)).wait_for_line("average rate")
+    rate = desk.start(
+        *command("topic", "hz", "odom", "--window", "5", *CLIENT, here)
+    ).wait_for_line("average rate")
     assert float(rate.split()[-1]) < 6.0, "each step of the sim crossed"
-    assert desk.run(*command("topic", "echo", "clock", "--once", "--timeout", "2", *CLIENT, here)).returncode
+    assert desk.run(
+        *command("topic", "echo", "clock", "--once", "--timeout", "2", *CLIENT, here)
+    ).returncode
     cable.lose(0.02)
     cable.cut()
     began = time.monotonic()

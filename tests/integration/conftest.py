@@ -51,8 +51,8 @@ def robot(only_robot: Robot) -> Robot:
 
 @pytest.fixture
 def verb(call: Verb) -> Verb:
-    """`verb(wire, "topic", "list")`: run `holozen topic list` on a wire, in this process. As a process of its own each
-    verb is tried in test_every_verb.py.
+    """`verb(wire, "topic", "list")`: run `holozen topic list` on a wire, in this process. As a
+    process of its own each verb is tried in test_every_verb.py.
     """
     return lambda wire, *words: call(*words, *wire.flags)
 
@@ -64,7 +64,8 @@ def start_sim(wire: Wire, *flags: str) -> Process:
     return sim
 
 
-# A subscriber as Zenoh makes it by default, with a queue that blocks when it is full; it is never read.
+# A subscriber as Zenoh makes it by default, with a queue that blocks when it is full; it is never
+# read.
 DEAF = """
 import sys, time, zenoh
 config = zenoh.Config()
@@ -74,7 +75,7 @@ session = zenoh.open(config)  # kept: one without a reference is closed
 subscriber = session.declare_subscriber(sys.argv[2])
 print("deaf", flush=True)
 time.sleep(3600)
-"""
+"""  # noqa: E501
 
 
 def deaf(wire: Wire, key: str) -> Process:

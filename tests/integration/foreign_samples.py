@@ -4,7 +4,11 @@ from rosbags.typesys import Stores, get_typestore
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 Twist, Vector3 = (STORE.types[f"geometry_msgs/msg/{name}"] for name in ("Twist", "Vector3"))
-CDR = bytes(STORE.serialize_cdr(Twist(Vector3(1.5, 0.0, -2.0), Vector3(0.0, 0.0, 0.25)), "geometry_msgs/msg/Twist"))
+CDR = bytes(
+    STORE.serialize_cdr(
+        Twist(Vector3(1.5, 0.0, -2.0), Vector3(0.0, 0.0, 0.25)), "geometry_msgs/msg/Twist"
+    )
+)
 
 PUTS = {  # by key: payload and Zenoh Encoding
     "a/json": (b'{"speed": 1.5, "name": "x"}', "application/json"),

@@ -4,8 +4,8 @@ import os
 import subprocess
 from pathlib import Path
 
-from holozen.bag import Message
-from holozen.bag.reader import Bag
+from holozen.bags import Message
+from holozen.bags.reader import Bag
 from holozen.testing import Wire, wait_for
 
 
@@ -55,7 +55,8 @@ def parts_at(wire: Wire) -> dict[str, int]:
         words = words_of(pid)
         if words == words_of(parent_of(pid)):  # it is about to become another program
             continue
-        names = [Path(word).name for word in words]  # `python -m holozen` as well as `.venv/bin/holozen`
+        # `python -m holozen` as well as `.venv/bin/holozen`
+        names = [Path(word).name for word in words]
         if wire.endpoint in words and "holozen" in names and "-c" not in words:
             found[words[names.index("holozen") + 1]] = pid
     return found

@@ -7,11 +7,25 @@ from pathlib import Path
 from typing import Any
 
 from holozen.bus import Bus
-from holozen.messages import CommandStatus, Message, Odometry, TriggerReply, TriggerRequest, Twist, TwistStamped
-from holozen.messages.rcl_interfaces import Parameter, ParameterValue, SetParametersReply, SetParametersRequest
+from holozen.messages import (
+    CommandStatus,
+    Message,
+    Odometry,
+    TriggerReply,
+    TriggerRequest,
+    Twist,
+    TwistStamped,
+)
+from holozen.messages.rcl_interfaces import (
+    Parameter,
+    ParameterValue,
+    SetParametersReply,
+    SetParametersRequest,
+)
 from holozen.testing import wait_for
 from holozen.testing.process import PATIENCE
 from holozen.transport.pubsub import Received, Subscription
+from holozen.transport.samples import Sample
 from holozen.wire import key_for
 
 URDF = Path(__file__).parents[2] / "urdf"
@@ -23,8 +37,9 @@ Planar = tuple[float, float, float]
 class Record:
     """Everything that came on a key since this began, in order.
 
-    What one key brings says nothing of what has come on another, and a message may come long after it was sent. So what
-    a test asks for is of after a moment by the time of its sending: all processes of a test have one clock.
+    What one key brings says nothing of what has come on another, and a message may come long after
+    it was sent. So what a test asks for is of after a moment by the time of its sending: all
+    processes of a test have one clock.
     """
 
     def __init__(self, subscription: Subscription[Any]) -> None:
@@ -38,7 +53,7 @@ class Record:
             self._received.append(received)
             if received.message is not None:
                 self._messages.append(received.message)
-            if (stamp := received.stamp) and stamp.sent > began:
+            if began < sent_at(received) < math.inf:
                 break  # a sim that goes as fast as it can may publish more than this can read
         return self._received
 
@@ -50,7 +65,9 @@ class Record:
         """What is sent from now on."""
         return Part(self)
 
-    def next(self, wanted: Callable[[Any], object] = lambda _: True, within: float = PATIENCE) -> Any:
+    def next(
+        self, wanted: Callable[[Any], object] = lambda _: True, within: float = PATIENCE
+    ) -> Any:
         """The first message that is sent from now on and is as wanted; waits for it."""
         return self.from_now().next(wanted, within)
 
@@ -71,7 +88,9 @@ class Part:
     def messages(self) -> list[Any]:
         return [received.message for received in self.all() if received.message is not None]
 
-    def next(self, wanted: Callable[[Any], object] = lambda _: True, within: float = PATIENCE) -> Any:
+    def next(
+        self, wanted: Callable[[Any], object] = lambda _: True, within: float = PATIENCE
+    ) -> Any:
         """The first message that is as wanted; waits for it."""
         looked = 0
 
@@ -79,14 +98,18 @@ class Part:
             nonlocal looked
             new = self.all()[looked:]
             looked += len(new)
-            return next((r.message for r in new if r.message is not None and wanted(r.message)), None)
+            return next(
+                (r.message for r in new if r.message is not None and wanted(r.message)), None
+            )
 
         return wait_for(look, within, "such a message")
 
 
-def sent_at(received: Received[Any]) -> float:
-    """When it was sent, s as of time.monotonic; infinity for what carries no stamp."""
-    return received.stamp.sent if received.stamp else math.inf
+def sent_at(received: Sample) -> float:
+    """When it was sent, s as of time.monotonic; infinity for what a foreign program sent."""
+    if not received.stamp or not received.timestamp:
+        return math.inf
+    return received.timestamp[0] * 1e-9 - (time.time() - time.monotonic())
 
 
 def record(bus: Bus, key: str, *kinds: type[Message]) -> Record:
@@ -105,9 +128,13 @@ class Robot:
         self.odom.next(within=60)  # its sim, and what starts that, may only just have begun
 
     def wait_longer(self, seconds: float = 2.0) -> "Robot":
-        """Let it stop only after so much silence: a test that measures a drive may be held up. Itself."""
+        """Let it stop only after so much silence: a test that measures a drive may be held up.
+        Itself.
+        """
         timeout = Parameter(f"{self.name}.command_timeout".lstrip("."), ParameterValue.of(seconds))
-        reported = self.bus.call("sim/set_parameters", SetParametersRequest([timeout]), SetParametersReply)
+        reported = self.bus.call(
+            "sim/set_parameters", SetParametersRequest([timeout]), SetParametersReply
+        )
         assert reported.results[0].successful, reported
         return self
 
@@ -130,9 +157,15 @@ class Robot:
         self._publisher.put(Twist.planar(x, y, turn))
 
     def drive(
-        self, x: float = 0.0, y: float = 0.0, turn: float = 0.0, until: Callable[[Odometry], object] | None = None
+        self,
+        x: float = 0.0,
+        y: float = 0.0,
+        turn: float = 0.0,
+        until: Callable[[Odometry], object] | None = None,
     ) -> list[Odometry]:
-        """Command with every odom, until one is as wanted (default: until the robot moves so). Returns them."""
+        """Command with every odom, until one is as wanted (default: until the robot moves so).
+        Returns them.
+        """
         wanted = until or (lambda odom: moves(odom, x, y, turn))
         part, seen = self.odom.from_now(), 0
         self.put(x, y, turn)
@@ -145,7 +178,10 @@ class Robot:
                 self.put(x, y, turn)
             return any(wanted(odom) for odom in new)
 
-        wait_for(look, what=lambda: f"the robot to be driven as commanded; its status: {self.last_status()}")
+        wait_for(
+            look,
+            what=lambda: f"the robot to be driven as commanded; its status: {self.last_status()}",
+        )
         odoms: list[Odometry] = part.messages()[:seen]
         return odoms
 
@@ -170,7 +206,9 @@ class Robot:
     def pass_time(self, seconds: float) -> Odometry:
         """Let that much sim time pass."""
         end = time_of(self.newest()) + seconds
-        odom: Odometry = self.odom.next(lambda odom: time_of(odom) >= end, within=PATIENCE + 2 * seconds)
+        odom: Odometry = self.odom.next(
+            lambda odom: time_of(odom) >= end, within=PATIENCE + 2 * seconds
+        )
         return odom
 
     def resume(self) -> str:

@@ -44,7 +44,9 @@ def result(process: Process) -> tuple[str, Any]:
     """The last status and result."""
     process.wait()
     last = json.loads(process.out.splitlines()[-1])
-    assert process.returncode == (130 if last["status"] == "CANCELED" else int(last["status"] != "SUCCEEDED"))
+    assert process.returncode == (
+        130 if last["status"] == "CANCELED" else int(last["status"] != "SUCCEEDED")
+    )
     return last["status"], last["result"]
 
 
@@ -82,18 +84,31 @@ def test_the_robot_drives_to_a_pose_and_tells_how_far_it_is(town: Wire, robot: R
     x = place(robot.newest())[0]
     process = send(town, "navigate_to_pose", {"pose": pose(x + 0.3, header={"frame_id": "odom"})})
     assert result(process) == ("SUCCEEDED", {"error_code": 0, "error_msg": ""})
-    first, *_, last = [json.loads(line)["feedback"] for line in process.out.splitlines() if "feedback" in line]
+    first, *_, last = [
+        json.loads(line)["feedback"] for line in process.out.splitlines() if "feedback" in line
+    ]
     assert first["distance_remaining"] == pytest.approx(0.3, abs=0.02)
     assert last["distance_remaining"] < 0.2
     assert last["current_pose"]["header"]["frame_id"] == "odom"
     assert place(robot.stands())[:2] == pytest.approx((x + 0.3, 0.0), abs=0.02)
 
 
-def test_the_robot_follows_waypoints_from_an_index_on_and_in_loops(town: Wire, robot: Robot) -> None:
+def test_the_robot_follows_waypoints_from_an_index_on_and_in_loops(
+    town: Wire, robot: Robot
+) -> None:
     poses = [pose(0.3), pose(0.3, 0.1), pose(0.2, 0.1)]
-    process = send(town, "follow_waypoints", {"poses": poses, "goal_index": 1, "number_of_loops": 1})
-    assert result(process) == ("SUCCEEDED", {"missed_waypoints": [], "error_code": 0, "error_msg": ""})
-    numbers = [json.loads(line)["feedback"]["current_waypoint"] for line in process.out.splitlines() if "feed" in line]
+    process = send(
+        town, "follow_waypoints", {"poses": poses, "goal_index": 1, "number_of_loops": 1}
+    )
+    assert result(process) == (
+        "SUCCEEDED",
+        {"missed_waypoints": [], "error_code": 0, "error_msg": ""},
+    )
+    numbers = [
+        json.loads(line)["feedback"]["current_waypoint"]
+        for line in process.out.splitlines()
+        if "feed" in line
+    ]
     assert list(dict.fromkeys(numbers)) == [1, 2, 0]
     assert numbers[-1] == 2
     assert place(robot.stands())[:2] == pytest.approx((0.2, 0.1), abs=0.02)
@@ -101,13 +116,25 @@ def test_the_robot_follows_waypoints_from_an_index_on_and_in_loops(town: Wire, r
 
 def test_a_wrong_goal_is_rejected_with_the_reason(town: Wire, verb: Verb) -> None:
     for action, goal, reason in (
-        ("navigate_to_pose", {"pose": pose(1.0, header={"frame_id": "moon"})}, "its frame is 'moon'; give it in"),
+        (
+            "navigate_to_pose",
+            {"pose": pose(1.0, header={"frame_id": "moon"})},
+            "its frame is 'moon'; give it in",
+        ),
         ("navigate_to_pose", {"pose": pose(1e9)}, "it is more than 1e+06 m away"),
         ("navigate_to_pose", {"behavior_tree": "a.xml"}, "there are no behavior trees here"),
         ("follow_waypoints", {}, "it has no poses"),
-        ("follow_waypoints", {"poses": [pose(0), pose(1e9)]}, "pose 1: it is more than 1e+06 m away"),
+        (
+            "follow_waypoints",
+            {"poses": [pose(0), pose(1e9)]},
+            "pose 1: it is more than 1e+06 m away",
+        ),
         ("follow_waypoints", {"poses": [pose(0)], "goal_index": 1}, "goal_index is 1; use 0 to 0"),
-        ("follow_waypoints", {"poses": [pose(0)], "number_of_loops": 20000}, "at most 10000 in all"),
+        (
+            "follow_waypoints",
+            {"poses": [pose(0)], "number_of_loops": 20000},
+            "at most 10000 in all",
+        ),
     ):
         done = verb(town, "action", "send_goal", action, json.dumps(goal), "--feedback", "--json")
         assert_one_line(done, 1, reason)
@@ -190,7 +217,8 @@ def test_a_goal_is_not_driven_to_by_the_next_robot_or_after_a_reset(
     fred.stands()
     odoms = fred.odom.from_now()
     fred.pass_time(1.0)
-    assert all(moves(odom, 0, 0, 0) for odom in odoms.messages())  # a spawned one comes to rest on the floor
+    # a spawned one comes to rest on the floor
+    assert all(moves(odom, 0, 0, 0) for odom in odoms.messages())
     assert aborted(goal) == reason
 
 
@@ -208,7 +236,10 @@ def test_the_sim_makes_steps_and_tells_how_many(wire: Wire) -> None:
     status, outcome = result(process)
     assert status == "CANCELED"
     assert outcome["result"]["error_message"].startswith("the goal was cancelled, ")
-    assert result(send(wire, "simulate_steps", {}))[1]["result"]["error_message"] == "steps is 0; use 1 to 10000000"
+    assert (
+        result(send(wire, "simulate_steps", {}))[1]["result"]["error_message"]
+        == "steps is 0; use 1 to 10000000"
+    )
     wire.run("sim", "play")
     playing = result(send(wire, "simulate_steps", {"steps": 1}))[1]["result"]["error_message"]
     assert playing.startswith("the sim is playing; pause it to step")
@@ -221,5 +252,11 @@ def test_the_lists_leave_out_what_an_action_consists_of(town: Wire, verb: Verb) 
     ):
         assert "_action" not in verb(town, *words).stdout
         assert hidden in verb(town, *words, f"--include-hidden-{words[0]}s").stdout.splitlines()
-    assert verb(town, "action", "list").stdout == "follow_waypoints\nnavigate_to_pose\nsimulate_steps\n"
-    assert verb(town, "action", "type", "/navigate_to_pose").stdout == "nav2_msgs/action/NavigateToPose\n"
+    assert (
+        verb(town, "action", "list").stdout
+        == "follow_waypoints\nnavigate_to_pose\nsimulate_steps\n"
+    )
+    assert (
+        verb(town, "action", "type", "/navigate_to_pose").stdout
+        == "nav2_msgs/action/NavigateToPose\n"
+    )

@@ -1,4 +1,6 @@
-"""A whole system that writes CDR: another library reads what the sim publishes and drives it; JSON drives it too."""
+"""A whole system that writes CDR: another library reads what the sim publishes and drives it; JSON
+drives it too.
+"""
 
 import contextlib
 import math
@@ -51,7 +53,9 @@ def twist(x: float) -> bytes:
     return bytes(STORE.serialize_cdr(message, "geometry_msgs/msg/Twist"))
 
 
-def test_what_the_sim_publishes_is_cdr_of_the_type_of_its_topic(robot: Robot, foreign: zenoh.Session) -> None:
+def test_what_the_sim_publishes_is_cdr_of_the_type_of_its_topic(
+    robot: Robot, foreign: zenoh.Session
+) -> None:
     for row in [row for row in TOPICS if "sim" in row.writers]:
         with foreign.declare_subscriber(row.key) as subscriber:
             sample = subscriber.recv()
@@ -65,7 +69,9 @@ def test_what_the_sim_publishes_is_cdr_of_the_type_of_its_topic(robot: Robot, fo
             assert bytes(STORE.serialize_cdr(message, row.type_name)) == bytes(sample.payload)
 
 
-def test_a_command_in_cdr_drives_with_and_without_its_type(robot: Robot, foreign: zenoh.Session) -> None:
+def test_a_command_in_cdr_drives_with_and_without_its_type(
+    robot: Robot, foreign: zenoh.Session
+) -> None:
     def drives(x: float, encoding: str) -> bool:
         foreign.put("cmd_vel", twist(x), encoding=encoding)
         return moves(robot.newest(), x, 0, 0)
@@ -75,9 +81,13 @@ def test_a_command_in_cdr_drives_with_and_without_its_type(robot: Robot, foreign
 
 
 def test_the_examples_of_the_docs_run(only_robot: tuple[Wire, Robot], robot: Robot) -> None:
-    drives, converts = re.findall(r"```python\n(.*?)```", (REPO / "docs" / "interfaces.md").read_text(), re.DOTALL)
+    drives, converts = re.findall(
+        r"```python\n(.*?)```", (REPO / "docs" / "interfaces.md").read_text(), re.DOTALL
+    )
     exec(converts, {})
-    with Process([sys.executable, "-c", drives.replace("tcp/127.0.0.1:7447", only_robot[0].endpoint)]) as example:
+    with Process(
+        [sys.executable, "-c", drives.replace("tcp/127.0.0.1:7447", only_robot[0].endpoint)]
+    ) as example:
         robot.odom.next(lambda odom: moves(odom, 0.3, 0, 0))
         assert example.wait() == 0
 
@@ -89,14 +99,24 @@ def test_json_still_drives(robot: Robot) -> None:
 def test_a_bad_command_is_refused_with_its_reason(robot: Robot, foreign: zenoh.Session) -> None:
     for payload, encoding, kind, reason in [
         (twist(0.3)[:-1], "application/cdr", "malformed", "not a Twist: cut off after 51 bytes"),
-        (twist(0.3), "application/cdr;geometry_msgs/msg/Accel", "malformed", "encoding names geometry_msgs/msg/Accel"),
+        (
+            twist(0.3),
+            "application/cdr;geometry_msgs/msg/Accel",
+            "malformed",
+            "encoding names geometry_msgs/msg/Accel",
+        ),
         (twist(float("nan")), "application/cdr", "not finite", "linear.x is not a finite number"),
         (twist(float("inf")), "application/cdr", "not finite", "linear.x is not a finite number"),
         (b"\x00\x01\x00\x00" + b"\xff" * 600, "application/cdr", "malformed", "552 bytes too many"),
     ]:
         before = robot.status().refused.get(kind, 0)
 
-        def refused(payload: bytes = payload, encoding: str = encoding, kind: str = kind, before: int = before) -> str:
+        def refused(
+            payload: bytes = payload,
+            encoding: str = encoding,
+            kind: str = kind,
+            before: int = before,
+        ) -> str:
             foreign.put("cmd_vel", payload, encoding=encoding)
             status = robot.status()
             return status.last_refusal if status.refused.get(kind, 0) > before else ""

@@ -1,4 +1,6 @@
-"""The conformance test of bases: the sim passes it, and a base that lacks one of its rules is told which."""
+"""The conformance test of bases: the sim passes it, and a base that lacks one of its rules is told
+which.
+"""
 
 import math
 import subprocess
@@ -10,7 +12,16 @@ from typing import Any
 
 import pytest
 
-from holozen.messages import Header, Odometry, Pose, PoseWithCovariance, Time, TriggerReply, TriggerRequest, Twist
+from holozen.messages import (
+    Header,
+    Odometry,
+    Pose,
+    PoseWithCovariance,
+    Time,
+    TriggerReply,
+    TriggerRequest,
+    Twist,
+)
 from holozen.messages.geometry_msgs import Point, TwistWithCovariance
 from holozen.testing import Wire, conformance
 from holozen.testing.conformance import PROMISES, Probe, name
@@ -48,16 +59,29 @@ class Naive:
         self._commands = self._bus.subscribe("cmd_vel", Twist)
         self._odom = self._bus.publisher("odom", Odometry)
         if lacks != "stop":
-            self._bus.serve("stop", TriggerRequest, TriggerReply, lambda _: self._stop(True)).start()
-            self._bus.serve("release", TriggerRequest, TriggerReply, lambda _: self._stop(False)).start()
-            self._bus.serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply(True)).start()
+            self._bus.serve(
+                "stop", TriggerRequest, TriggerReply, lambda _: self._stop(True)
+            ).start()
+            self._bus.serve(
+                "release", TriggerRequest, TriggerReply, lambda _: self._stop(False)
+            ).start()
+            self._bus.serve(
+                "resume", TriggerRequest, TriggerReply, lambda _: TriggerReply(True)
+            ).start()
 
     def _stop(self, stopped: bool) -> TriggerReply:
         self._stopped = stopped
         return TriggerReply(True)
 
     def live(self, end: threading.Event) -> None:
-        x, speed, heard, person, before, late = 0.0, 0.0, -math.inf, -math.inf, time.monotonic(), 0.0
+        x, speed, heard, person, before, late = (
+            0.0,
+            0.0,
+            -math.inf,
+            -math.inf,
+            time.monotonic(),
+            0.0,
+        )
         while not end.wait(0.2 if self._lacks == "rate" else 0.02):
             now = time.monotonic()
             for received in iter(self._commands.try_recv, None):
@@ -89,7 +113,9 @@ class Naive:
         ("scale", "its_odometry_is_steady_and_agrees_with_itself", "its pose moved"),
     ],
 )
-def test_a_base_without_a_rule_is_told_which(lacks: str, promise: str, reason: str, wire: Wire) -> None:
+def test_a_base_without_a_rule_is_told_which(
+    lacks: str, promise: str, reason: str, wire: Wire
+) -> None:
     end = threading.Event()
     naive = threading.Thread(target=Naive(wire, lacks).live, args=(end,))
     naive.start()
@@ -101,13 +127,14 @@ def test_a_base_without_a_rule_is_told_which(lacks: str, promise: str, reason: s
         naive.join()
 
 
-@pytest.mark.parametrize("promise", PROMISES, ids=name)
-def test_a_naive_base_with_all_rules_keeps_every_promise(promise: Any, wire: Wire) -> None:
+def test_a_naive_base_with_all_rules_keeps_every_promise(wire: Wire) -> None:
     end = threading.Event()
     naive = threading.Thread(target=Naive(wire, "nothing").live, args=(end,))
     naive.start()
     try:
-        promise(Probe(wire.bus))
+        probe = Probe(wire.bus)
+        for promise in PROMISES:
+            promise(probe)
     finally:
         end.set()
         naive.join()

@@ -1,4 +1,6 @@
-"""The controller drives from goal to goal, in whatever order the processes start, and gives way to people."""
+"""The controller drives from goal to goal, in whatever order the processes start, and gives way to
+people.
+"""
 
 import contextlib
 import re
@@ -14,7 +16,8 @@ from .robots import Robot, distance, moves, place, rests
 
 LEG = re.compile(r"lap (\d+) goal (\d+): \((.*), (.*), (.*) deg\) in (.*) s, path error (.*) mm")
 SQUARE = [(0.5, 0.0, 90), (0.5, 0.5, 180), (0.0, 0.5, -90), (0.0, 0.0, 0)]  # with --size 0.5
-FAST = ("--rtf", "2")  # faster, a stop that a busy machine delays by some ms turns the robot too far
+# faster, a stop that a busy machine delays by some ms turns the robot too far
+FAST = ("--rtf", "2")
 GOALS = ("--size", "0.5")
 
 
@@ -53,7 +56,9 @@ class Scene:
         self._wire = wire
 
     def person(self, name: str) -> Robot:
-        """The robot as a person has it; each test's has a name of its own, which the controller reports."""
+        """The robot as a person has it; each test's has a name of its own, which the controller
+        reports.
+        """
         return Robot(self._wire.bus(name), priority="INTERACTIVE_HIGH")
 
     def takes_over(self, person: Robot, name: str) -> None:
@@ -66,7 +71,9 @@ class Scene:
     def controller_drives(self) -> None:
         wait_for(
             self.controller_is_obeyed,
-            what=lambda: f"the controller to drive: {self.robot.status()}, {self.controller.err[-500:]}",
+            what=lambda: (
+                f"the controller to drive: {self.robot.status()}, {self.controller.err[-500:]}"
+            ),
         )
         self.robot.odom.next(lambda odom: not rests(odom))
 
@@ -109,7 +116,9 @@ def test_it_yields_to_a_person_and_stays_off_until_resume(town: Wire, shared: Sc
     done = town.run("controller", "--resume")
     assert (done.returncode, done.stderr) == (0, "every source may drive\n")
     shared.controller_drives()
-    wait_for(lambda: shared.controller.err.count("continues") == continued + 1, what="it to report that")
+    wait_for(
+        lambda: shared.controller.err.count("continues") == continued + 1, what="it to report that"
+    )
 
 
 def test_it_publishes_no_cmd_vel_while_a_person_has_the_robot(shared: Scene) -> None:
@@ -147,7 +156,11 @@ def hands_over(terminal: Terminal, shared: Scene) -> None:
 
     def pressed() -> bool:
         terminal.type("r")
-        wait_for(lambda: "not handed over: no reply" in terminal.screen() or shared.controller_is_obeyed())
+        wait_for(
+            lambda: (
+                "not handed over: no reply" in terminal.screen() or shared.controller_is_obeyed()
+            )
+        )
         return shared.controller_is_obeyed()
 
     wait_for(pressed)
@@ -176,13 +189,19 @@ def test_it_stops_when_odom_stops_goes_on_when_it_is_back_and_stops_the_robot_be
     assert "Traceback" not in scene.controller.err
 
 
-def test_a_robot_that_is_not_there_is_reported_with_those_that_are(town: Wire, shared: Scene) -> None:
+def test_a_robot_that_is_not_there_is_reported_with_those_that_are(
+    town: Wire, shared: Scene
+) -> None:
     controller = town.start("controller", "Fred")
-    controller.wait_for_line("waiting for Fred: no node publishes its odom; there are: the one at the root of the keys")
+    controller.wait_for_line(
+        "waiting for Fred: no node publishes its odom; there are: the one at the root of the keys"
+    )
     assert controller.terminate() == 0
 
 
-def test_killed_it_leaves_a_robot_that_stands_and_one_started_at_once_drives_it(scene: Scene, wire: Wire) -> None:
+def test_killed_it_leaves_a_robot_that_stands_and_one_started_at_once_drives_it(
+    scene: Scene, wire: Wire
+) -> None:
     scene.controller.kill()
     last = scene.robot.newest()
     scene.controller = wire.start("controller", "--laps", "0")

@@ -15,7 +15,7 @@ from .robots import place, speeds, time_of
 NOISE = 0.05
 TAGS = {
     "first": "<gaussianNoise>0.05</gaussianNoise>",
-    "second": "<odometryOrigin>start</odometryOrigin><maxLinearAcceleration>0.5</maxLinearAcceleration>"
+    "second": "<odometryOrigin>start</odometryOrigin><maxLinearAcceleration>0.5</maxLinearAcceleration>"  # noqa: E501
     "<max_angular_velocity>0.3</max_angular_velocity>",
 }
 
@@ -24,10 +24,12 @@ def text(tags: str) -> str:
     return f"""<robot name="r"><link name="base"><inertial><mass value="1"/>
 <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial><collision><geometry>
 <box size="0.3 0.3 0.1"/></geometry></collision></link><gazebo><plugin name="d" filename="libgazebo_ros_planar_move.so">
-{tags}<odometryRate>60</odometryRate></plugin></gazebo></robot>"""
+{tags}<odometryRate>60</odometryRate></plugin></gazebo></robot>"""  # noqa: E501
 
 
-def test_origin_noise_and_limits_are_those_of_the_tags(lock_step: Callable[..., LockStep], tmp_path: Path) -> None:
+def test_origin_noise_and_limits_are_those_of_the_tags(
+    lock_step: Callable[..., LockStep], tmp_path: Path
+) -> None:
     flags = []
     for name, tags in TAGS.items():
         (tmp_path / f"{name}.urdf").write_text(text(tags))
@@ -56,7 +58,9 @@ def test_origin_noise_and_limits_are_those_of_the_tags(lock_step: Callable[..., 
         assert abs(fmean(values)) < 4 * NOISE / len(once) ** 0.5
         assert stdev(values) == pytest.approx(NOISE, rel=0.25)
     both = once.keys() & (again := noise()).keys()
-    assert {time: again[time] for time in both} == {time: once[time] for time in both}, "the same after a reset"
+    assert {time: again[time] for time in both} == {time: once[time] for time in both}, (
+        "the same after a reset"
+    )
     assert len(both) > 100
 
     start = sim.reset()
@@ -68,10 +72,14 @@ def test_origin_noise_and_limits_are_those_of_the_tags(lock_step: Callable[..., 
     sim.drive(turn=1.0)
     assert speeds(sim.step(60)) == pytest.approx((0, 0, 0.3), abs=1e-3)
     entities.delete(sim.bus, "second")
-    entities.spawn(sim.bus, "second", text(TAGS["second"]), Pose.of((0, 2, 0), (0, 0, 0.5**0.5, 0.5**0.5)))
+    entities.spawn(
+        sim.bus, "second", text(TAGS["second"]), Pose.of((0, 2, 0), (0, 0, 0.5**0.5, 0.5**0.5))
+    )
     sim.step()
     sim.drive(x=1.0)
-    assert place(sim.step(120)) == pytest.approx((0.0625, 0, 0), abs=2e-3), "forward, whichever way it faced"
+    assert place(sim.step(120)) == pytest.approx((0.0625, 0, 0), abs=2e-3), (
+        "forward, whichever way it faced"
+    )
     assert entities.pose(sim.bus, "second").position.y == pytest.approx(2.0625, abs=2e-3)
     sim.drive()
     assert max(map(abs, speeds(sim.step(2)))) < 1e-3, "a stop is immediate"

@@ -1,6 +1,7 @@
 """Every verb alone, beside what runs, and interrupted: no traceback, one line, the right exit code.
 
-A test tries all verbs of its kind: side by side, each as a process, or one after the other in this one.
+A test tries all verbs of its kind: side by side, each as a process, or one after the other in this
+one.
 """
 
 import itertools
@@ -20,11 +21,11 @@ import pytest
 import zenoh
 
 from holozen import cli, data
-from holozen.bag.formats import as_cdr
-from holozen.bag.writer import BagWriter
+from holozen.bags.formats import as_cdr
+from holozen.bags.writer import BagWriter
 from holozen.bus import Bus
-from holozen.cli.spawn import Place, spawn_file
 from holozen.messages import Odometry
+from holozen.spawning import SpawnPose, spawn_file
 from holozen.testing import Terminal, Wire, process, wait_for
 from holozen.testing.process import START
 from holozen.testing.wire import free_port
@@ -35,12 +36,14 @@ from .verbs import VERBS, Row
 
 BOT = data.find("urdf", "hb_bot.urdf.xacro")
 BALL = """<robot name="ball"><link name="b"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>
-<collision><geometry><sphere radius="0.1"/></geometry></collision></link></robot>"""
+<collision><geometry><sphere radius="0.1"/></geometry></collision></link></robot>"""  # noqa: E501
 SIDE_BY_SIDE, MANY = 6, 20  # processes at once: those that work, and those that mostly wait
 HERE = 0  # one after the other, in the main thread of this process
 
 RACE = "dispatcher/resource.rs"
-"""Where a thread of Zenoh's panics when many sessions come and go beside each other: eclipse-zenoh/zenoh#2624."""
+"""Where a thread of Zenoh's panics when many sessions come and go beside each other:
+eclipse-zenoh/zenoh#2624.
+"""
 MAX_RACES = 3  # of some 300 tries; nothing is tried again
 RACED: list[str] = []
 
@@ -48,10 +51,12 @@ Done = subprocess.CompletedProcess[str]
 T = TypeVar("T")
 
 OTHER_NAMES = {"topic plot": "plot", "bag record": "record", "bag play": "replay"}
-"""Verbs that do what another does: they are tried with what is wrong, and with their work as JSON."""
+"""Verbs that do what another does: they are tried with what is wrong, and with their work as JSON.
+"""
 ONCE = [name for name in VERBS if name not in OTHER_NAMES]
 LIVE = [name for name, row in VERBS.items() if row.live is not None]
-TEXT = [name for name in LIVE if not (VERBS[name].foreign or VERBS[name].endless)]  # the others print it there
+# the others print it there
+TEXT = [name for name in LIVE if not (VERBS[name].foreign or VERBS[name].endless)]
 WRONG = [name for name, row in VERBS.items() if row.wrong]
 ON_THE_WIRE = [name for name in ONCE if name in LIVE and VERBS[name].bus]
 SILENT = [name for name in ONCE if VERBS[name].silent]
@@ -64,14 +69,16 @@ def of_each_noun(names: list[str]) -> list[str]:
 
 
 OF_EACH_NOUN = of_each_noun(ON_THE_WIRE)
-WAITING = of_each_noun([name for name in ON_THE_WIRE if not VERBS[name].endless and name != "doctor"])
+WAITING = of_each_noun(
+    [name for name in ON_THE_WIRE if not VERBS[name].endless and name != "doctor"]
+)
 
 
 def words_of(verb: str) -> list[str]:
     """A verb, or the verbs of a noun."""
     if verb in cli.NOUNS:
-        return [f"{verb} {name}" for name in cli.VERBS[verb].split(", ")]
-    return [verb, *(f"{verb} {name}" for name in cli.SERVICE_VERBS.get(verb, ()))]
+        return [f"{verb} {name}" for name in cli.VERBS[verb].about.split(", ")]
+    return [verb, *(f"{verb} {name}" for name in cli.VERBS[verb].verbs)]
 
 
 def test_every_verb_has_a_row() -> None:
@@ -103,7 +110,9 @@ class Files:
     def words(self, name: str, words: str, n: str) -> list[str]:
         """The words of a verb, filled in."""
         files = {"bot": BOT} | {key: self.tmp / file for key, file in FILES.items()}
-        filled = words.format(n=n, id=n + "".join(name.split()), tmp=self.tmp, free=next(self._free), **files)
+        filled = words.format(
+            n=n, id=n + "".join(name.split()), tmp=self.tmp, free=next(self._free), **files
+        )
         return [*name.split(), *shlex.split(filled)]
 
 
@@ -117,21 +126,24 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
 
 @pytest.fixture(scope="module")
 def busy(town: Wire, files: Files) -> Iterator[Wire]:
-    """A sim with robots, a pose service, and a foreign node that publishes on many keys, listens and answers.
+    """A sim with robots, a pose service, and a foreign node that publishes on many keys, listens
+    and answers.
 
     They take processor time as long as they run, so the tests that need none of it come first.
     """
     start_sim(town, "--rtf", "0.2")  # nothing waits for its time, and it costs less
     with Bus("setup", town.connection) as bus:  # gone again: every verb would connect to it
-        spawn_file(bus, BOT, "Spare", Place(x=2.0))
-        spawn_file(bus, BOT, "Free", Place(x=-8.0))  # `stop Spare` runs beside `release Free`
+        spawn_file(bus, BOT, "Spare", SpawnPose(x=2.0))
+        spawn_file(bus, BOT, "Free", SpawnPose(x=-8.0))  # `stop Spare` runs beside `release Free`
         for n, x in (("text", -2.0), ("json", -3.0), ("pipe", -4.0)):
-            spawn_file(bus, files.tmp / "ball.urdf", f"Doomed{n}", Place(x=x))
+            spawn_file(bus, files.tmp / "ball.urdf", f"Doomed{n}", SpawnPose(x=x))
     town.start("pose-service").wait_for_line("goals")
     done = threading.Event()
     with zenoh.open(foreign_config(town)) as session:
         heard = session.declare_subscriber("a/heard", zenoh.handlers.RingChannel(1))
-        asked = session.declare_queryable("a/asked", lambda query: query.reply("a/asked", b'{"x": 1}'))
+        asked = session.declare_queryable(
+            "a/asked", lambda query: query.reply("a/asked", b'{"x": 1}')
+        )
         talker = threading.Thread(target=_talk, args=(session, done))
         talker.start()
         yield town
@@ -146,8 +158,12 @@ def _talk(session: zenoh.Session, done: threading.Event) -> None:
             session.put(key, payload, encoding=encoding)
 
 
-def tries(names: list[str], attempt: Callable[[str], T], at_once: int = SIDE_BY_SIDE) -> Iterator[tuple[str, T]]:
-    """What came of the same try with many verbs, but for those that Zenoh's own race took part in."""
+def tries(
+    names: list[str], attempt: Callable[[str], T], at_once: int = SIDE_BY_SIDE
+) -> Iterator[tuple[str, T]]:
+    """What came of the same try with many verbs, but for those that Zenoh's own race took part
+    in.
+    """
     with ThreadPoolExecutor(at_once or 1) as pool:
         outcomes = (pool.map if at_once else map)(attempt, names)
         done = dict(zip(names, outcomes, strict=True))
@@ -167,7 +183,9 @@ def flags(row: Row, wire: Wire) -> list[str]:
 
 
 def is_clean(text: str) -> bool:
-    return not any(word in text for word in ("Traceback", "Exception ignored", "Error:", "panicked"))
+    return not any(
+        word in text for word in ("Traceback", "Exception ignored", "Error:", "panicked")
+    )
 
 
 def assert_one_line(name: str, done: Done, code: int, part: str) -> None:
@@ -202,7 +220,9 @@ def test_a_client_without_a_router_gives_up(files: Files) -> None:
 
     for name, done in tries(OF_EACH_NOUN, attempt, MANY):
         if name == "doctor":
-            assert done.returncode == 1 and done.stdout.count("error") == 1 and is_clean(done.stderr), done
+            assert (
+                done.returncode == 1 and done.stdout.count("error") == 1 and is_clean(done.stderr)
+            ), done
             assert f"{nowhere[-1]} cannot be reached: Connection refused" in done.stdout, done
         else:
             waits, fails = done.stderr.splitlines()
@@ -212,7 +232,9 @@ def test_a_client_without_a_router_gives_up(files: Files) -> None:
 
 
 def test_ctrl_c_ends_what_waits(files: Files) -> None:
-    """Interrupted while they wait for a router that accepts their connection and stays silent: all in the same way."""
+    """Interrupted while they wait for a router that accepts their connection and stays silent: all
+    in the same way.
+    """
 
     def attempt(name: str) -> tuple[int, str]:
         with socket.create_server(("127.0.0.1", 0)) as mute:
@@ -238,7 +260,9 @@ def test_it_does_its_work(busy: Wire, files: Files, call: Verb) -> None:
         return call(*files.words(name, row.live or "", "text"), *flags(row, busy))
 
     for name, done in tries(TEXT, attempt, HERE):
-        assert done.returncode in {VERBS[name].code, int(name == "doctor")}, f"{name}: {done.stderr}"
+        assert done.returncode in {VERBS[name].code, int(name == "doctor")}, (
+            f"{name}: {done.stderr}"
+        )
         assert done.stdout or done.stderr, name
         assert is_clean(done.stderr), f"{name}: {done.stderr}"
 
@@ -246,12 +270,18 @@ def test_it_does_its_work(busy: Wire, files: Files, call: Verb) -> None:
 def test_as_json_it_is_one_object_a_line(busy: Wire, files: Files) -> None:
     def attempt(name: str) -> Done:
         row = VERBS[name]
-        return run([*files.words(name, row.live or "", "json"), "--json", *flags(row, busy)], is_new=True)
+        return run(
+            [*files.words(name, row.live or "", "json"), "--json", *flags(row, busy)], is_new=True
+        )
 
     for name, done in tries(LIVE, attempt):
-        assert done.returncode in {VERBS[name].code, int(name == "doctor")}, f"{name}: {done.stderr}"
+        assert done.returncode in {VERBS[name].code, int(name == "doctor")}, (
+            f"{name}: {done.stderr}"
+        )
         assert done.stdout, name
-        assert all(isinstance(json.loads(line), dict) for line in done.stdout.splitlines()), f"{name}: {done.stdout}"
+        assert all(isinstance(json.loads(line), dict) for line in done.stdout.splitlines()), (
+            f"{name}: {done.stdout}"
+        )
         assert is_clean(done.stderr), f"{name}: {done.stderr}"
 
 
@@ -261,7 +291,10 @@ def test_a_reader_that_is_gone_ends_it_quietly(busy: Wire, files: Files) -> None
         os.close(reading)
         row = VERBS[name]
         with open(writing, "wb") as gone:
-            return run([*files.words(name, row.live or "", "pipe"), "--json", *flags(row, busy)], stdout=gone)
+            return run(
+                [*files.words(name, row.live or "", "pipe"), "--json", *flags(row, busy)],
+                stdout=gone,
+            )
 
     for name, done in tries(OF_EACH_NOUN, attempt):
         assert done.returncode == 0, f"{name}: {done.stderr}"
@@ -297,7 +330,11 @@ def test_ctrl_c_ends_what_would_go_on(busy: Wire, files: Files) -> None:
             wire = own if row.live is None else busy
             begun, words = row.endless.begun, files.words(name, row.endless.words, "endless")
             with Terminal([*START, *words, *flags(row, wire)]) as terminal:
-                wait_for(lambda: re.search(begun, terminal.raw), 20, lambda: f"{begun} in {terminal.raw[-2000:]}")
+                wait_for(
+                    lambda: re.search(begun, terminal.raw),
+                    20,
+                    lambda: f"{begun} in {terminal.raw[-2000:]}",
+                )
                 terminal.type("\x03")
                 return terminal.process.wait(30), terminal.raw
 

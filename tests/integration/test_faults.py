@@ -35,7 +35,9 @@ def bus(town: Wire) -> Iterator[Bus]:
 
 @contextmanager
 def keeps_its_step(bus: Bus) -> Iterator[None]:
-    """The sim keeps its step during that: at least seven tenths of that of another one, which has nothing to do."""
+    """The sim keeps its step during that: at least seven tenths of that of another one, which has
+    nothing to do.
+    """
     with Wire() as idle:
         idle.start("sim", "--empty").wait_for_line("no robot yet")
         mine, other = (each.latest("clock", Clock) for each in (bus, idle.bus()))
@@ -79,23 +81,33 @@ FAULTS: dict[str, tuple[str, str]] = {
     "a mass of nan": (robot(link("a", INERTIAL.format("nan"))), "'nan' is not a finite number"),
     "a mass below zero": (robot(link("a", INERTIAL.format("-1"))), "is negative"),
     "a mass of abc": (robot(link("a", INERTIAL.format("abc"))), "'abc' is not a finite number"),
-    "a radius of zero": (robot(link("a", INERTIAL.format(1) + BALL.format(0))), "each number must be"),
+    "a radius of zero": (
+        robot(link("a", INERTIAL.format(1) + BALL.format(0))),
+        "each number must be",
+    ),
     "billion laughs": (f"{LAUGHS}]><robot name='&j;'/>", "entity"),
-    "an external entity": ('<!DOCTYPE r [<!ENTITY a SYSTEM "/etc/passwd">]><robot name="r">&a;</robot>', "entity"),
+    "an external entity": (
+        '<!DOCTYPE r [<!ENTITY a SYSTEM "/etc/passwd">]><robot name="r">&a;</robot>',
+        "entity",
+    ),
     "macros without end": (
-        XACRO.format('<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/>'), "without end",
+        XACRO.format('<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/>'),
+        "without end",
     ),
     "9**9**9": (XACRO.format('<link name="${9**9**9}"/>'), "9**9**9"),
     "a hundred million bytes": (f"<robot name='r'><!--{MANY}--></robot>", "MB"),
-}  # fmt: skip
+}
 
 
-# Each is read by the verb itself; errors in the others are reported in the same way by the same reader.
+# Each is read by the verb itself; errors in the others are reported in the same way by the same
+# reader.
 AT_THE_VERB = ("an unclosed tag", "9**9**9", "a hundred million bytes")
 
 
 @pytest.mark.parametrize("fault", AT_THE_VERB)
-def test_an_impossible_robot_is_one_error_line(town: Wire, bus: Bus, tmp_path: Path, fault: str) -> None:
+def test_an_impossible_robot_is_one_error_line(
+    town: Wire, bus: Bus, tmp_path: Path, fault: str
+) -> None:
     text, reported = FAULTS[fault]
     file = tmp_path / ("r.urdf.xacro" if "xmlns:xacro" in text else "r.urdf")
     file.write_text(text.replace(MANY, 100_000_000 * "x"))
@@ -136,13 +148,19 @@ def test_an_unusable_mesh_is_one_warning_and_the_robot_stands_on_a_box(
         assert town.run("spawn", str(file), "--strict", within=3 * LIMIT).returncode == 1
 
 
-def test_four_hundred_links_are_a_robot_like_any_other(town: Wire, bus: Bus, tmp_path: Path) -> None:
+def test_four_hundred_links_are_a_robot_like_any_other(
+    town: Wire, bus: Bus, tmp_path: Path
+) -> None:
     names = [f"l{number}" for number in range(400)]
     links = "".join(link(name, INERTIAL.format(0.01) + BALL.format(0.1)) for name in names)
     joints = "".join(joint("l0", name) for name in names[1:])
     (tmp_path / "r.urdf").write_text(robot(links + joints + DRIVE))
     ended = town.run("spawn", str(tmp_path / "r.urdf"), "--name", "Fred", within=LIMIT)
-    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "Fred listens on Fred/cmd_vel\n", "")
+    assert (ended.returncode, ended.stdout, ended.stderr) == (
+        0,
+        "Fred listens on Fred/cmd_vel\n",
+        "",
+    )
     entities.delete(bus, "Fred")
 
 
@@ -156,12 +174,17 @@ RAW = {fault: text for fault, (text, _) in FAULTS.items() if MANY not in text} |
 
 
 @pytest.mark.alone
-def test_what_comes_over_the_wire_is_refused_in_one_line_or_harmless_and_the_sim_keeps_its_step(bus: Bus) -> None:
+def test_what_comes_over_the_wire_is_refused_in_one_line_or_harmless_and_the_sim_keeps_its_step(
+    bus: Bus,
+) -> None:
     with keeps_its_step(bus):
         for fault, text in RAW.items():
             request = SpawnEntityRequest("Fred", resource_string=text)
             try:
-                assert bus.call("spawn_entity", request, SpawnEntityReply, timeout=LIMIT).entity_name == "Fred"
+                assert (
+                    bus.call("spawn_entity", request, SpawnEntityReply, timeout=LIMIT).entity_name
+                    == "Fred"
+                )
                 entities.delete(bus, "Fred")
                 assert fault == "a file of this machine"
             except ServiceError as error:

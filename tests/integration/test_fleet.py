@@ -25,7 +25,9 @@ def fleet(town: Wire) -> Wire:
     town.start("sim", "--empty").wait_for_line("no robot yet", LONG)
     bot = str(data.find("urdf", "hb_bot.urdf.xacro"))
     done = town.run("spawn", bot, "--count", str(COUNT), "--grid", "1.5", within=LONG)
-    assert done.stdout == f"{FIRST} .. {LAST} listen on {FIRST}/cmd_vel .. {LAST}/cmd_vel\n", done.stderr
+    assert done.stdout == f"{FIRST} .. {LAST} listen on {FIRST}/cmd_vel .. {LAST}/cmd_vel\n", (
+        done.stderr
+    )
     return town
 
 
@@ -42,7 +44,12 @@ def test_each_is_listed_drawn_diagnosed_and_driven_by_its_name(fleet: Wire) -> N
         drawn = json.loads(fleet.run("map", "--json", "-w", "2", within=LONG).stdout)
         return len(drawn["robots"]) == COUNT
 
-    looks = (partial(listed, "list"), partial(listed, "topic", "find", "Odometry"), diagnosed, all_drawn)
+    looks = (
+        partial(listed, "list"),
+        partial(listed, "topic", "find", "Odometry"),
+        diagnosed,
+        all_drawn,
+    )
     with ThreadPoolExecutor() as pool:
         for look in [pool.submit(wait_for, look, LONG) for look in looks]:
             look.result()

@@ -1,4 +1,6 @@
-"""The verbs that look, on foreign keys: plain zenoh that publishes JSON, text, any bytes, and CDR by rosbags."""
+"""The verbs that look, on foreign keys: plain zenoh that publishes JSON, text, any bytes, and CDR
+by rosbags.
+"""
 
 import json
 import os
@@ -22,7 +24,9 @@ SHOWN = "linear:\n  x: 1.5\n  y: 0.0\n  z: -2.0\nangular:\n  x: 0.0\n  y: 0.0\n 
 
 @pytest.fixture(scope="module")
 def town() -> Iterator[Wire]:
-    """A place where a foreign node puts all of PUTS at 100 Hz; of ours only one that holds a meeting point."""
+    """A place where a foreign node puts all of PUTS at 100 Hz; of ours only one that holds a
+    meeting point.
+    """
     with Wire() as wire:
         wire.bus("door")
         done = threading.Event()
@@ -57,7 +61,7 @@ def test_what_a_foreign_node_puts_is_shown(verb: Verb, town: Wire) -> None:
         assert (done.returncode, done.stdout, done.stderr) == (0, shown, "")
 
 
-NEITHER = "neither text, JSON, msgpack nor CDR"
+NEITHER = "neither text, JSON nor CDR"
 NO_TYPE = "for CDR give the type: --type T"
 ODOMETRY = "not a nav_msgs/msg/Odometry: cut off after 52 bytes; --type is wrong, or the bytes are"
 
@@ -130,12 +134,16 @@ def test_an_expression_shows_the_field_of_those_that_have_it(verb: Verb, town: W
 
 
 def test_an_unknown_field_of_a_key_is_an_error_with_the_closest(verb: Verb, town: Wire) -> None:
-    expected = "holozen topic echo: a/json: no field 'sped' (did you mean 'speed'?); there are speed, name"
+    expected = (
+        "holozen topic echo: a/json: no field 'sped' (did you mean 'speed'?); there are speed, name"
+    )
     assert_one_line(verb(town, "topic", "echo", "a/json", "--field", "sped"), 1, expected)
 
 
 @pytest.mark.parametrize("measure", ["hz", "bw"])
-def test_rates_and_sizes_of_foreign_samples_are_reported_without_losses(verb: Verb, town: Wire, measure: str) -> None:
+def test_rates_and_sizes_of_foreign_samples_are_reported_without_losses(
+    verb: Verb, town: Wire, measure: str
+) -> None:
     done = verb(town, "topic", measure, "a/json", "--once")
     assert (done.returncode, done.stderr) == (0, "")
     assert "lost" not in done.stdout
@@ -147,7 +155,9 @@ def test_rates_and_sizes_of_foreign_samples_are_reported_without_losses(verb: Ve
 def test_delay_reports_that_there_is_no_stamp(verb: Verb, town: Wire) -> None:
     for ends in (("--timeout", "1"), ("--once",)):
         done = verb(town, "topic", "delay", "a/json", *ends)
-        assert_one_line(done, 1, "holozen topic delay: ", " messages have no header.stamp, and so no age")
+        assert_one_line(
+            done, 1, "holozen topic delay: ", " messages have no header.stamp, and so no age"
+        )
     delay = town.start("topic", "delay", "a/json")
     delay.wait_for_line("messages have no header.stamp, and so no age")
     assert "no new messages" not in delay.err
@@ -155,7 +165,11 @@ def test_delay_reports_that_there_is_no_stamp(verb: Verb, town: Wire) -> None:
 
 def test_delay_reports_that_there_is_no_clock(verb: Verb, town: Wire) -> None:
     done = verb(town, "topic", "delay", "a/stamped", "--timeout", "1")
-    assert_one_line(done, 1, " messages have stamps by another clock than this machine's, and nothing comes on clock")
+    assert_one_line(
+        done,
+        1,
+        " messages have stamps by another clock than this machine's, and nothing comes on clock",
+    )
 
 
 def test_list_sees_foreign_nodes_if_it_listens(verb: Verb, town: Wire) -> None:
@@ -174,7 +188,9 @@ def test_info_shows_what_a_foreign_node_sends(verb: Verb, town: Wire) -> None:
     assert verb(town, "topic", "info", "a/schema").stdout.startswith(
         "Type: geometry_msgs/msg/Twist\nPublisher count: 1\n"
     )
-    assert_one_line(verb(town, "topic", "info", "a/nothing"), 1, "unknown key 'a/nothing': no nodes found at ")
+    assert_one_line(
+        verb(town, "topic", "info", "a/nothing"), 1, "unknown key 'a/nothing': no nodes found at "
+    )
 
 
 def test_type_shows_what_a_foreign_node_sends(verb: Verb, town: Wire) -> None:
@@ -214,7 +230,11 @@ def test_a_reader_that_is_gone_ends_it_quietly(town: Wire, words: str) -> None:
     os.close(reading)
     with open(writing, "wb") as gone:
         done = subprocess.run(
-            command("topic", *words.split(), *town.flags), stdout=gone, stderr=subprocess.PIPE, text=True, timeout=30
+            command("topic", *words.split(), *town.flags),
+            stdout=gone,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=30,
         )
     assert done.returncode == 0
     assert "Traceback" not in done.stderr

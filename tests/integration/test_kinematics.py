@@ -1,4 +1,6 @@
-"""What is commanded is what odom shows, to a millimetre: the closed form of a constant velocity in the plane."""
+"""What is commanded is what odom shows, to a millimetre: the closed form of a constant velocity in
+the plane.
+"""
 
 import math
 
@@ -61,7 +63,9 @@ def test_forward_is_where_the_robot_looks_after_a_turn(sim: LockStep) -> None:
     for _ in range(10):
         drive(sim, (0.5, 0.0, 0.0))
     end = place(sim.odom)
-    assert math.atan2(end[1] - start[1], end[0] - start[0]) == pytest.approx(start[2], abs=MILLIMETRE)
+    assert math.atan2(end[1] - start[1], end[0] - start[0]) == pytest.approx(
+        start[2], abs=MILLIMETRE
+    )
     assert math.dist(start[:2], end[:2]) == pytest.approx(1.0, abs=MILLIMETRE)
 
 

@@ -1,4 +1,6 @@
-"""A payload that is far too large is refused and counted, and takes neither memory nor the link from anybody."""
+"""A payload that is far too large is refused and counted, and takes neither memory nor the link
+from anybody.
+"""
 
 import os
 from collections.abc import Iterator
@@ -46,11 +48,20 @@ def memory(process: Process) -> int:
 def test_a_sim_that_got_payloads_of_hundreds_of_mb_counts_them_and_is_as_small_as_before(
     sim: Process, driver: Bus, foreign: Bus, key: str
 ) -> None:
-    odom, status = record(driver, "Rover/odom", Odometry), record(driver, "Rover/cmd_vel_status", CommandStatus)
+    odom, status = (
+        record(driver, "Rover/odom", Odometry),
+        record(driver, "Rover/cmd_vel_status", CommandStatus),
+    )
     commands = driver.publisher("Rover/cmd_vel", Twist)
     wait_for(foreign.served("spawn_entity"))
-    before, counted, links = memory(sim), status.next().refused.get("oversized", 0), driver.session.info.peers_zid()
-    sender = foreign.session.declare_publisher(key, congestion_control=zenoh.CongestionControl.BLOCK)
+    before, counted, links = (
+        memory(sim),
+        status.next().refused.get("oversized", 0),
+        driver.session.info.peers_zid(),
+    )
+    sender = foreign.session.declare_publisher(
+        key, congestion_control=zenoh.CongestionControl.BLOCK
+    )
     wait_for(lambda: sender.matching_status.matching)
     payload = zenoh.ZBytes(bytes(LARGE))
     for number in range(1, 4):
@@ -61,7 +72,9 @@ def test_a_sim_that_got_payloads_of_hundreds_of_mb_counts_them_and_is_as_small_a
             return any(each.refused.get("oversized", 0) >= wanted for each in status.messages())
 
         wait_for(is_counted, 30)
-    wait_for(lambda: memory(sim) < before + NEAR, what=lambda: f"{before} bytes; it has {memory(sim)}")
+    wait_for(
+        lambda: memory(sim) < before + NEAR, what=lambda: f"{before} bytes; it has {memory(sim)}"
+    )
     assert driver.session.info.peers_zid() == links
 
     def moves() -> bool:
@@ -80,10 +93,14 @@ def test_nothing_is_received_through_shared_memory(sim: Process, town: Wire) -> 
         assert [line for line in maps.splitlines() if "/dev/shm/" in line] == []
 
 
-def test_a_request_of_hundreds_of_mb_is_refused_and_takes_no_memory(sim: Process, foreign: Bus) -> None:
+def test_a_request_of_hundreds_of_mb_is_refused_and_takes_no_memory(
+    sim: Process, foreign: Bus
+) -> None:
     wait_for(foreign.served("spawn_entity"))
     before = memory(sim)
     (reply,) = foreign.ask("spawn_entity", 30.0, payload=zenoh.ZBytes(bytes(LARGE)))
     assert not isinstance(reply, Sample)
     assert str(refusal(reply)) == f"request of {LARGE} bytes; at most {MAX_REQUEST_BYTES} are read"
-    wait_for(lambda: memory(sim) < before + NEAR, what=lambda: f"{before} bytes; it has {memory(sim)}")
+    wait_for(
+        lambda: memory(sim) < before + NEAR, what=lambda: f"{before} bytes; it has {memory(sim)}"
+    )

@@ -37,7 +37,9 @@ def battery(request: pytest.FixtureRequest, wire: Wire, tmp_path: Path) -> Proce
         path = tmp_path / "package" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
-    return wire.start("run", "--wire", request.param, str(tmp_path / "package" / "scripts" / "battery.py"))
+    return wire.start(
+        "run", "--wire", request.param, str(tmp_path / "package" / "scripts" / "battery.py")
+    )
 
 
 def test_others_learn_it_from_the_publisher(wire: Wire, battery: Process, tmp_path: Path) -> None:
@@ -49,8 +51,13 @@ def test_others_learn_it_from_the_publisher(wire: Wire, battery: Process, tmp_pa
         shown = wire.run("interface", "show", name)
         assert shown.stderr == ""
         assert shown.stdout.splitlines()[-6:] == [
-            "Cell[] cells", "\tuint8 FULL=2", "\tfloat32 volts", "\tuint8 state 1", "string maker", "bool[2] on",
-        ]  # fmt: skip
+            "Cell[] cells",
+            "\tuint8 FULL=2",
+            "\tfloat32 volts",
+            "\tuint8 state 1",
+            "string maker",
+            "bool[2] on",
+        ]
 
     done = wire.run("record", "battery", "-o", str(tmp_path / "bag"), "--max-duration", "1")
     assert done.returncode == 0, done.stderr

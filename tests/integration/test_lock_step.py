@@ -1,4 +1,6 @@
-"""A sim whose time passes in steps: what it does in them, to the last bit, is the same whenever it is done."""
+"""A sim whose time passes in steps: what it does in them, to the last bit, is the same whenever it
+is done.
+"""
 
 import hashlib
 import math
@@ -14,6 +16,7 @@ from msgspec import structs
 from holozen import entities
 from holozen.bus import Bus
 from holozen.data import find
+from holozen.engines import is_installed
 from holozen.flags import ENGINES
 from holozen.messages import (
     Clock,
@@ -51,7 +54,11 @@ BALL_URDF = """<robot name="ball"><link name="ball"><inertial><mass value="0.1"/
 <collision><geometry><sphere radius="0.05"/></geometry></collision></link></robot>"""
 ROBOTS = tuple(
     word
-    for file, name in (("hb_bot.urdf.xacro", "Planar"), ("rover.urdf.xacro", "Skid"), ("wheely_boi.xacro", "Balance"))
+    for file, name in (
+        ("hb_bot.urdf.xacro", "Planar"),
+        ("rover.urdf.xacro", "Skid"),
+        ("wheely_boi.xacro", "Balance"),
+    )
     for word in ("--robot", f"{find('urdf', file)}={name}")
 )
 
@@ -91,7 +98,7 @@ def drive(sim: LockStep) -> str:
     return hash_of_poses(sim.bus)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", [one for one in ENGINES if is_installed(one)])
 def test_the_same_commands_at_the_same_steps_move_all_to_the_same_bits(
     lock_step: Sim, trials: Callable[[int, int], int], engine: str
 ) -> None:
@@ -108,7 +115,9 @@ def test_the_same_commands_at_the_same_steps_move_all_to_the_same_bits(
     assert len(hashes) == 1
 
 
-def test_a_reply_follows_all_messages_of_its_steps_and_the_state_after_the_last(sim: LockStep) -> None:
+def test_a_reply_follows_all_messages_of_its_steps_and_the_state_after_the_last(
+    sim: LockStep,
+) -> None:
     odom = sim.bus.subscribe("odom", Odometry, depth=1000)
     clock = sim.bus.subscribe("clock", Clock, depth=1000)
     wanted: dict[str, Subscription[Any]] = {"odom": odom, "clock": clock}
@@ -117,7 +126,9 @@ def test_a_reply_follows_all_messages_of_its_steps_and_the_state_after_the_last(
         sim.bus.call("step_simulation", si.StepSimulationRequest(steps), si.StepSimulationReply)
         for key, messages in ((key, all_of(subscription)) for key, subscription in wanted.items()):
             new = {stamp for stamp in map(stamp_of, messages) if stamp > time + 1e-6}
-            assert len(new) in (expected, expected + 1), f"{key} comes at its rate, and with the last step"
+            assert len(new) in (expected, expected + 1), (
+                f"{key} comes at its rate, and with the last step"
+            )
             assert stamp_of(messages[-1]) == max(new) == pytest.approx(time + steps / 240)
         time += steps / 240
 
@@ -131,7 +142,9 @@ def test_while_it_is_paused_odom_goes_on_and_nothing_moves_then_or_later(sim: Lo
     assert all(reported.pose.pose.position == start.pose.pose.position for reported in waiting)
     set_state(sim, State.STATE_PLAYING)
     played = [received_after(odom, start.header.stamp) for _ in range(10)]
-    assert max(abs(reported.twist.twist.linear.x) for reported in played) < 1e-3, "the command is one of before"
+    assert max(abs(reported.twist.twist.linear.x) for reported in played) < 1e-3, (
+        "the command is one of before"
+    )
     commands = sim.bus.publisher("cmd_vel", Twist)
 
     def moves() -> bool:
@@ -171,10 +184,14 @@ def test_a_reset_moves_nothing_and_its_readers_see_the_next_epoch(sim: LockStep)
     assert stamp_of(all_of(odom)[-1]) == 0
     assert sim.step(60).pose.pose.position.x == pytest.approx(first.pose.pose.position.x, abs=1e-4)
     sim.drive(x=0.4)
-    assert sim.step(60).pose.pose.position.x == pytest.approx(0.1, abs=1e-3), "its odom is due as before"
+    assert sim.step(60).pose.pose.position.x == pytest.approx(0.1, abs=1e-3), (
+        "its odom is due as before"
+    )
 
 
-def test_a_controller_drives_its_lap_in_steps_through_a_pause_and_a_reset(lock_step: Sim, wire: Wire) -> None:
+def test_a_controller_drives_its_lap_in_steps_through_a_pause_and_a_reset(
+    lock_step: Sim, wire: Wire
+) -> None:
     sim = lock_step()
     odom = sim.bus.subscribe("odom", Odometry, depth=1000)
     commands = sim.bus.subscribe("cmd_vel", Twist, depth=1000)
@@ -183,7 +200,9 @@ def test_a_controller_drives_its_lap_in_steps_through_a_pause_and_a_reset(lock_s
     for turn in range(1000):
         if turn == 10:
             all_of(odom)
-            assert len({stamp_of(received_after(odom)) for _ in range(10)}) == 1, "half a second without a step"
+            assert len({stamp_of(received_after(odom)) for _ in range(10)}) == 1, (
+                "half a second without a step"
+            )
         if turn == 20:
             sim.reset()
         sim.step(12)  # as long as between two commands
@@ -193,8 +212,11 @@ def test_a_controller_drives_its_lap_in_steps_through_a_pause_and_a_reset(lock_s
     assert controller.returncode == 0
     legs = re.findall(r"lap 1 goal \d: .* deg\) in (.*) s, path error (.*) mm", controller.out)
     assert len(legs) == 4
-    # 0.3 m at 0.5 m/s, and 90 degrees at 1 rad/s at the same time; the first with what was driven before the reset.
-    assert all(1.5 < float(seconds) < 5 and float(error) < 50 for seconds, error in legs), controller.out
+    # 0.3 m at 0.5 m/s, and 90 degrees at 1 rad/s at the same time; the first with what was driven
+    # before the reset.
+    assert all(1.5 < float(seconds) < 5 and float(error) < 50 for seconds, error in legs), (
+        controller.out
+    )
     assert "lap 1 goal 3: (0.00, 0.00, 0 deg)" in controller.out
 
 
@@ -224,16 +246,24 @@ def test_what_cannot_be_done_is_refused_with_its_result(lock_step: Sim) -> None:
     sim = lock_step()
     for steps in (0, 10_000_001):
         assert refused(sim, "step_simulation", si.StepSimulationRequest(steps)) == (
-            si.Result.OPERATION_FAILED, f"steps is {steps}; use 1 to 10000000",
-        )  # fmt: skip
-    assert refused(sim, "reset_simulation", si.ResetSimulationRequest(9))[0] == si.Result.FEATURE_UNSUPPORTED
+            si.Result.OPERATION_FAILED,
+            f"steps is {steps}; use 1 to 10000000",
+        )
     assert (
-        refused(sim, "set_simulation_state", si.SetSimulationStateRequest(State(9)))[0] == si.Result.FEATURE_UNSUPPORTED
+        refused(sim, "reset_simulation", si.ResetSimulationRequest(9))[0]
+        == si.Result.FEATURE_UNSUPPORTED
+    )
+    assert (
+        refused(sim, "set_simulation_state", si.SetSimulationStateRequest(State(9)))[0]
+        == si.Result.FEATURE_UNSUPPORTED
     )
     assert set_state(sim, State.STATE_PAUSED) == si.SetSimulationStateReply.ALREADY_IN_TARGET_STATE
     assert set_state(sim, State.STATE_STOPPED) == si.Result.OK
     problem = "the sim is stopped; pause it to step: `holozen sim pause`"
-    assert refused(sim, "step_simulation", si.StepSimulationRequest()) == (si.Result.INCORRECT_STATE, problem)
+    assert refused(sim, "step_simulation", si.StepSimulationRequest()) == (
+        si.Result.INCORRECT_STATE,
+        problem,
+    )
     assert get_state(sim) == State.STATE_STOPPED
     assert set_state(sim, State.STATE_PAUSED) == si.Result.OK
     with ThreadPoolExecutor() as pool:
@@ -245,25 +275,44 @@ def test_what_cannot_be_done_is_refused_with_its_result(lock_step: Sim) -> None:
     assert sim.process.wait() == 0
 
 
-def test_the_command_line_pauses_plays_steps_and_resets(sim: LockStep, town: Wire, verb: Verb) -> None:
-    words = ("pause", "step 24", "reset --scope time", "step 12 --json", "reset --json", "play", "play --json")
+def test_the_command_line_pauses_plays_steps_and_resets(
+    sim: LockStep, town: Wire, verb: Verb
+) -> None:
+    words = (
+        "pause",
+        "step 24",
+        "reset --scope time",
+        "step 12 --json",
+        "reset --json",
+        "play",
+        "play --json",
+    )
     reported = [verb(town, "sim", *word.split()) for word in words]
     assert [done.returncode for done in reported] == [0] * len(words)
     assert [done.stdout for done in reported] == [
-        "paused\n", "made 24 steps\n", "reset: time\n", '{"steps": 12}\n', '{"scope": ["all"]}\n', "playing\n",
+        "paused\n",
+        "made 24 steps\n",
+        "reset: time\n",
+        '{"steps": 12}\n',
+        '{"scope": ["all"]}\n',
+        "playing\n",
         '{"state": "playing"}\n',
-    ]  # fmt: skip
+    ]
     assert reported[0].stderr == "holozen sim pause: the sim is paused already\n"
     assert get_state(sim) == State.STATE_PLAYING
 
 
-def test_a_robot_that_is_not_in_the_sim_is_named(lock_step: Sim, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_that_is_not_in_the_sim_is_named(
+    lock_step: Sim, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("holozen.testing.lock_step.PATIENCE", 1.0)
     with pytest.raises(AssertionError, match="'Fred listens on' from "):
         lock_step(robot="Fred")
 
 
-def test_steps_end_with_ctrl_c_and_with_their_timeout(verb: Verb, sim: LockStep, town: Wire) -> None:
+def test_steps_end_with_ctrl_c_and_with_their_timeout(
+    verb: Verb, sim: LockStep, town: Wire
+) -> None:
     interrupted = town.start("sim", "step", "10000000")
     wait_for(lambda: steps_of(sim))
     beside = verb(town, "sim", "step")
@@ -271,13 +320,15 @@ def test_steps_end_with_ctrl_c_and_with_their_timeout(verb: Verb, sim: LockStep,
     assert interrupted.returncode is None, "whose steps go on"
     assert interrupted.interrupt() == 130
     assert re.fullmatch(
-        r"holozen sim step: interrupted: the goal was cancelled, \d+ steps before the last one\n", interrupted.err
+        r"holozen sim step: interrupted: the goal was cancelled, \d+ steps before the last one\n",
+        interrupted.err,
     )
     stands(sim)
     late = verb(town, "sim", "step", "10000000", "--timeout", "0.2")
     assert late.returncode == 1
     assert re.fullmatch(
-        r"holozen sim: not done within 0.2 s, and ended: the goal was cancelled, \d+ steps before the last one; "
+        r"holozen sim: not done within 0.2 s, and ended: the goal was cancelled, \d+ steps before "
+        r"the last one; "
         r"--timeout gives them longer\n",
         late.stderr,
     )
@@ -307,7 +358,9 @@ def set_state(sim: LockStep, state: int) -> int:
 
 
 def get_state(sim: LockStep) -> int:
-    return sim.bus.call("get_simulation_state", si.GetSimulationStateRequest(), si.GetSimulationStateReply).state.state
+    return sim.bus.call(
+        "get_simulation_state", si.GetSimulationStateRequest(), si.GetSimulationStateReply
+    ).state.state
 
 
 def refused(sim: LockStep, key: str, request: Message) -> tuple[int, str]:
@@ -359,9 +412,13 @@ def test_the_scene_has_the_joints_as_joint_states_has_them(lock_step: Sim) -> No
     entities = sim.bus.call("get_scene", GetSceneRequest(), GetSceneReply).entities
     robot = next(entity for entity in entities if entity.name == "Unread")
     assert max(map(abs, robot.joints)) > 0.5
-    without = sim.bus.call("get_scene", GetSceneRequest(without_joints=True), GetSceneReply).entities
+    without = sim.bus.call(
+        "get_scene", GetSceneRequest(without_joints=True), GetSceneReply
+    ).entities
     assert without == [structs.replace(entity, joints=[]) for entity in entities]
-    names = sim.bus.call("robot_description", RobotDescriptionRequest(robot.name), RobotDescriptionReply).joints
+    names = sim.bus.call(
+        "robot_description", RobotDescriptionRequest(robot.name), RobotDescriptionReply
+    ).joints
     states = sim.bus.latest("Unread/joint_states", JointState)
     wait_for(lambda: states.count, what="joint_states")
     last, _ = states.read()

@@ -1,6 +1,8 @@
-"""When the process that drives a robot dies, the robot stands at once, long before the silence rule would stop it.
+"""When the process that drives a robot dies, the robot stands at once, long before the silence rule
+would stop it.
 
-The robots here have a watchdog of a minute, or none at all: what stops them within some seconds is nothing else.
+The robots here have a watchdog of a minute, or none at all: what stops them within some seconds is
+nothing else.
 """
 
 import sys
@@ -10,7 +12,7 @@ import pytest
 
 from holozen import entities
 from holozen.messages import Pose
-from holozen.robot.xacro import expand_xacro
+from holozen.robot.files.xacro import expand_xacro
 from holozen.testing import Process, Wire, wait_for
 
 from .conftest import start_sim
@@ -42,7 +44,9 @@ def robots(town: Wire) -> dict[str, Robot]:
     bus, at = town.bus(), Pose()
     for name, watchdog in WATCHDOGS.items():
         at.position.y -= 3.0
-        entities.spawn(bus, name, text.replace(TAG, f"<cmdTimeout>{watchdog}</cmdTimeout>{TAG}"), at)
+        entities.spawn(
+            bus, name, text.replace(TAG, f"<cmdTimeout>{watchdog}</cmdTimeout>{TAG}"), at
+        )
     return {name: Robot(bus, name) for name in WATCHDOGS}
 
 
@@ -57,13 +61,24 @@ def robot(robots: dict[str, Robot], request: pytest.FixtureRequest) -> Iterator[
 
 def driver(wire: Wire, robot: Robot, dead_man: bool = True) -> Process:
     """A program that drives the robot, and does so by now."""
-    process = Process([sys.executable, "-c", DRIVER, wire.endpoint, f"{robot.name}/cmd_vel", "yes" if dead_man else ""])
+    process = Process(
+        [
+            sys.executable,
+            "-c",
+            DRIVER,
+            wire.endpoint,
+            f"{robot.name}/cmd_vel",
+            "yes" if dead_man else "",
+        ]
+    )
     robot.odom.next(lambda odom: moves(odom, 0.4, 0, 0))
     assert robot.status().obeyed == process.wait_for_line("driver@")
     return process
 
 
-def test_a_driver_that_is_killed_leaves_a_robot_that_stands_and_obeys_the_next_one(town: Wire, robot: Robot) -> None:
+def test_a_driver_that_is_killed_leaves_a_robot_that_stands_and_obeys_the_next_one(
+    town: Wire, robot: Robot
+) -> None:
     for _ in range(2):
         with driver(town, robot) as process:
             process.kill()
@@ -78,19 +93,26 @@ def test_what_is_no_node_keeps_the_robots_own_watchdog(town: Wire, robot: Robot)
         assert moves(robot.newest(), 0.4, 0, 0)
 
 
-def test_a_foreign_node_that_is_killed_stops_no_robot(town: Wire, robot: Robot, robots: dict[str, Robot]) -> None:
+def test_a_foreign_node_that_is_killed_stops_no_robot(
+    town: Wire, robot: Robot, robots: dict[str, Robot]
+) -> None:
     other = next(other for other in robots.values() if other is not robot)
     graph = robot.bus.graph()
     with driver(town, other) as process, driver(town, robot):
         odoms, source = robot.odom.from_now(), other.status().obeyed
         process.kill()
-        wait_for(lambda: source in [node.source for node in graph.left()], what="the foreign node to leave")
+        wait_for(
+            lambda: source in [node.source for node in graph.left()],
+            what="the foreign node to leave",
+        )
         other.stands()
         robot.pass_time(0.3)
         assert all(moves(odom, 0.4, 0, 0) for odom in odoms.messages())
 
 
-def test_so_does_the_controller_stop_when_it_is_killed(town: Wire, robots: dict[str, Robot]) -> None:
+def test_so_does_the_controller_stop_when_it_is_killed(
+    town: Wire, robots: dict[str, Robot]
+) -> None:
     slow = robots["Slow"]
     slow.resume()
     town.start("pose-service").wait_for_line("goals")

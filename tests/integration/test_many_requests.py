@@ -1,4 +1,6 @@
-"""Many requests at once: each gets its answer or the word busy, and a stop goes before all of them."""
+"""Many requests at once: each gets its answer or the word busy, and a stop goes before all of
+them.
+"""
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -9,7 +11,7 @@ import pytest
 from holozen import entities
 from holozen.bus import Bus
 from holozen.messages import Pose, TriggerReply, TriggerRequest
-from holozen.robot.xacro import expand_xacro
+from holozen.robot.files.xacro import expand_xacro
 from holozen.testing import Wire, wait_for
 from holozen.transport.connection import Connection
 from holozen.transport.errors import TIMEOUT
@@ -30,7 +32,9 @@ def sim(town: Wire) -> None:
 
 @pytest.fixture(scope="module")
 def crowd(town: Wire, sim: None) -> Iterator[list[Bus]]:
-    """Fifty nodes; clients of the sim, for as many peers would talk to each other most of the time."""
+    """Fifty nodes; clients of the sim, for as many peers would talk to each other most of the
+    time.
+    """
     at_the_sim = Connection(mode="client", connect=(town.endpoint,))
     with ExitStack() as ends:
         crowd = [ends.enter_context(Bus(f"caller{number}", at_the_sim)) for number in range(50)]
@@ -62,15 +66,22 @@ def outcome(replies: list[Sample | bytes]) -> str:
 
 
 @pytest.mark.parametrize("callers", [1, 50])
-def test_every_request_of_a_thousand_is_answered(robot: Robot, crowd: list[Bus], callers: int) -> None:
+def test_every_request_of_a_thousand_is_answered(
+    robot: Robot, crowd: list[Bus], callers: int
+) -> None:
     assert outcomes(ask(crowd[:callers], "get_entities")) <= {"answered", "busy"}
 
 
-def test_a_flood_of_requests_holds_up_no_spawn_and_no_delete_of_others(robot: Robot, crowd: list[Bus]) -> None:
+def test_a_flood_of_requests_holds_up_no_spawn_and_no_delete_of_others(
+    robot: Robot, crowd: list[Bus]
+) -> None:
     at = Pose()
     at.position.y = 3.0
     urdf = expand_xacro(URDF / "hb_bot.urdf.xacro")
-    asked = [ask(crowd[:1], key) for key in ("get_entities", "get_entity_state", "spawn_entity", "delete_entity")]
+    asked = [
+        ask(crowd[:1], key)
+        for key in ("get_entities", "get_entity_state", "spawn_entity", "delete_entity")
+    ]
     entities.spawn(robot.bus, "Fred", urdf, at)
     asked.append(ask(crowd[:1], "delete_entity"))
     entities.delete(robot.bus, "Fred")
@@ -78,12 +89,17 @@ def test_a_flood_of_requests_holds_up_no_spawn_and_no_delete_of_others(robot: Ro
         assert "not answered" not in outcomes(replies)
 
 
-def test_a_stop_in_a_flood_of_requests_stands_at_once_and_stays(released: Robot, crowd: list[Bus]) -> None:
+def test_a_stop_in_a_flood_of_requests_stands_at_once_and_stays(
+    released: Robot, crowd: list[Bus]
+) -> None:
     robot = released
     robot.wait_longer(2.0)
     robot.drive(x=0.3, until=lambda odom: moves(odom, 0.3, 0, 0))
     with ThreadPoolExecutor() as pool:
-        floods = [pool.submit(ask, crowd[1:], key) for key in ("get_entities", "release", "resume", "stop")]
+        floods = [
+            pool.submit(ask, crowd[1:], key)
+            for key in ("get_entities", "release", "resume", "stop")
+        ]
         assert robot.bus.call("stop", TriggerRequest(), TriggerReply).success
         asked = [replies for flood in floods for replies in flood.result()]
     robot.odom.next(rests)

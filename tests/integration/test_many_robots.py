@@ -66,8 +66,13 @@ def test_they_start_side_by_side_and_apart(fred: Robot, ann: Robot) -> None:
 def test_their_frames_carry_their_names(fred: Robot, ann: Robot) -> None:
     odom = ann.newest()
     assert (odom.header.frame_id, odom.child_frame_id) == ("Ann/odom", "Ann/footprint_link")
-    frames = [t for message in [record(fred.bus, "Fred/tf", TFMessage).next()] for t in message.transforms]
-    assert all(t.header.frame_id.startswith("Fred/") and t.child_frame_id.startswith("Fred/") for t in frames)
+    frames = [
+        t for message in [record(fred.bus, "Fred/tf", TFMessage).next()] for t in message.transforms
+    ]
+    assert all(
+        t.header.frame_id.startswith("Fred/") and t.child_frame_id.startswith("Fred/")
+        for t in frames
+    )
     assert record(fred.bus, "Fred/joint_states", JointState).next().name
 
 
@@ -80,7 +85,9 @@ def test_there_is_no_robot_at_the_root(verb: Verb, town: Wire, fred: Robot) -> N
 
 def test_the_driver_of_fred_has_no_say_over_ann(town: Wire, fred: Robot, ann: Robot) -> None:
     person = Robot(town.bus("person"), "Fred", "INTERACTIVE_HIGH")
-    person.drive(0.3, until=lambda _: (status := fred.last_status()) and status.obeyed.startswith("person@"))
+    person.drive(
+        0.3, until=lambda _: (status := fred.last_status()) and status.obeyed.startswith("person@")
+    )
     assert ann.status().obeyed == ""
     ann.drive(0.2)
 
@@ -88,7 +95,9 @@ def test_the_driver_of_fred_has_no_say_over_ann(town: Wire, fred: Robot, ann: Ro
 def test_a_teleop_with_a_name_drives_that_robot(town: Wire, fred: Robot, ann: Robot) -> None:
     with town.terminal("teleop", "Ann") as terminal:
         terminal.wait_for_text("listening")
-        wait_for(lambda: "holozen teleop   Ann   Tab: Fred" in terminal.screen(), what=terminal.screen)
+        wait_for(
+            lambda: "holozen teleop   Ann   Tab: Fred" in terminal.screen(), what=terminal.screen
+        )
         commands = fred.commands.from_now()
         terminal.hold_until("i", lambda: moves(ann.newest(), 0.5, 0, 0))
         terminal.type("k")
@@ -112,11 +121,15 @@ WRONG = {
     "a robot with nothing to drive it": (["--robot", "{tmp}/still.urdf"], 1, "no plugin drives it"),
     "a picture for a robot": (["--robot", "{picture}"], 1, "logo.png"),
     "an illegal name": (["--robot", "{bot}=a/b"], 2, "robot name 'a/b'"),
-    "two robots of one name": (["--robot", "{bot}=A", "--robot", "{bot}=A"], 1, "2 robots are called 'A'"),
+    "two robots of one name": (
+        ["--robot", "{bot}=A", "--robot", "{bot}=A"],
+        1,
+        "2 robots are called 'A'",
+    ),
     "no such world": (["--world", "nowhere.world"], 1, "nowhere.world"),
     "a robot for a world": (["--world", "{tmp}/still.urdf"], 1, "is a robot (URDF), not a world"),
     "a factor of nan": (["--rtf", "nan"], 2, "'nan': use a number from 0 to 1000"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", WRONG)
@@ -137,12 +150,17 @@ def test_a_second_sim_only_joins_with_named_robots_and_then_both_are_one_world_t
     wire.start("router").wait_for_line("listens at")
     first = start_sim(wire, "--robot", f"{BOT}=Fred")
     for words, why in [
-        ([], "end it, choose another --domain, or join it with named robots: holozen sim --join --robot FILE=NAME"),
+        (
+            [],
+            "end it, choose another --domain, or join it with named robots: holozen sim --join "
+            "--robot FILE=NAME",
+        ),
         (["--robot", f"{BOT}=Ann"], "end it, choose another --domain, or join it"),
         (["--join"], "name the robots: holozen sim --join --robot FILE=NAME"),
         (["--join", "--robot", f"{BOT}=Ann", "--robot", str(BOT)], "name the robots: "),
     ]:
-        # A new Python: without --join a sim learns of others while its engine loads, and a forked one has loaded it.
+        # A new Python: without --join a sim learns of others while its engine loads, and a forked
+        # one has loaded it.
         done = run(command("sim", *words, *wire.flags), is_new=True)
         assert_one_line(done, 1, "sim: sim@", f" simulates here already; {why}")
     with Proxy(wire.port) as link:  # a slow one: what it joins is discovered late
@@ -156,7 +174,11 @@ def test_a_second_sim_only_joins_with_named_robots_and_then_both_are_one_world_t
 
 
 def assert_both_are_one_world(verb: Verb, wire: Wire) -> None:
-    wait_for(lambda: [line.split()[0] for line in verb(wire, "list").stdout.splitlines()] == ["Ann", "Fred"])
+    wait_for(
+        lambda: (
+            [line.split()[0] for line in verb(wire, "list").stdout.splitlines()] == ["Ann", "Fred"]
+        )
+    )
     clock = json.loads(verb(wire, "topic", "info", "clock", "--json").stdout)
     assert len(clock["publishers"]) == 1
     assert "duplicates" not in verb(wire, "doctor").stdout

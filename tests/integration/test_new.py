@@ -17,7 +17,9 @@ from .conftest import Verb
 @pytest.fixture
 def run(tmp_path: Path) -> Verb:
     """Run a command in an empty folder."""
-    return lambda *words: subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    return lambda *words: subprocess.run(
+        words, cwd=tmp_path, capture_output=True, text=True, timeout=60
+    )
 
 
 @pytest.fixture
@@ -54,7 +56,10 @@ def test_a_new_controller_passes_the_test_that_comes_with_it(run: Verb) -> None:
 
 def test_a_new_package_has_a_message_and_a_service(new: Verb, run: Verb) -> None:
     assert new("package", "our_msgs").returncode == 0
-    for name, field in (("our_msgs/msg/Battery", "float32 voltage"), ("our_msgs/srv/NextGoal", "int32 request_goal")):
+    for name, field in (
+        ("our_msgs/msg/Battery", "float32 voltage"),
+        ("our_msgs/srv/NextGoal", "int32 request_goal"),
+    ):
         assert field in run(*command("interface", "show", name)).stdout
 
 
@@ -70,7 +75,9 @@ def test_what_is_there_is_left_as_it_is(new: Verb, tmp_path: Path) -> None:
 def test_a_name_that_python_could_not_use_is_refused(new: Verb, tmp_path: Path, thing: str) -> None:
     for name in ("class", "holozen", "numpy", "math"):
         done = new(thing, name)
-        assert done.returncode == 2 and f"'{name}'" in done.stderr and "choose another" in done.stderr
+        assert (
+            done.returncode == 2 and f"'{name}'" in done.stderr and "choose another" in done.stderr
+        )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -78,7 +85,10 @@ def test_a_name_that_python_could_not_use_is_refused(new: Verb, tmp_path: Path, 
 def test_a_write_that_fails_leaves_nothing_in_the_way(run: Verb, tmp_path: Path) -> None:
     words = command("new", "controller", "go_there")
     done = run("prlimit", "--fsize=100", *words)
-    assert (done.returncode, done.stderr) == (1, "holozen new controller: go_there.py: File too large\n")
+    assert (done.returncode, done.stderr) == (
+        1,
+        "holozen new controller: go_there.py: File too large\n",
+    )
     assert list(tmp_path.iterdir()) == []
     assert run(*words).returncode == 0
 

@@ -15,17 +15,25 @@ from .robots import Record, Robot, moves, place, record, time_of
 
 KEYS = ("odom", "joint_states", "tf", "clock", "cmd_vel_status")
 
-# hb_bot's wheels as the lesson gives them: where they are (m), and where their axles point: along the radius.
-WHEELS = {"front_wheel_joint": (0.0, 0.68), "left_wheel_joint": (-0.58, -0.36), "right_wheel_joint": (0.58, -0.36)}
+# hb_bot's wheels as the lesson gives them: where they are (m), and where their axles point: along
+# the radius.
+WHEELS = {
+    "front_wheel_joint": (0.0, 0.68),
+    "left_wheel_joint": (-0.58, -0.36),
+    "right_wheel_joint": (0.58, -0.36),
+}
 RADIUS = 0.14  # m
 
 
 def wheel_rates(x: float, y: float, turn: float) -> dict[str, float]:
-    """rad/s of each wheel, right-handed about its axle; the ground speed across the axle is rolled off."""
+    """rad/s of each wheel, right-handed about its axle; the ground speed across the axle is rolled
+    off.
+    """
     rates = {}
     for name, (wx, wy) in WHEELS.items():
         length = math.hypot(wx, wy)
-        across = (wy / length, -wx / length)  # the axle, turned by -90 degrees: where a wheel of positive rate rolls
+        # the axle, turned by -90 degrees: where a wheel of positive rate rolls
+        across = (wy / length, -wx / length)
         rates[name] = ((x - turn * wy) * across[0] + (y + turn * wx) * across[1]) / RADIUS
     return rates
 
@@ -70,7 +78,9 @@ def test_odom_comes_at_the_rate_of_its_tag_by_its_own_stamps(robot: Robot) -> No
     stamps = [time_of(odom) for odom in robot.odom.messages()[-50:]]
     gaps = [later - earlier for earlier, later in pairwise(stamps)]
     assert min(gaps) > 0
-    assert all(0.02 - 1 / 240 - 1e-6 <= gap <= 0.02 + 1 / 240 + 1e-6 for gap in gaps), "none was left out"
+    assert all(0.02 - 1 / 240 - 1e-6 <= gap <= 0.02 + 1 / 240 + 1e-6 for gap in gaps), (
+        "none was left out"
+    )
     assert stamps[-1] - stamps[0] == pytest.approx(49 * 0.02, abs=1 / 120)
 
 
@@ -83,7 +93,9 @@ def test_odom_has_the_pose_in_the_world_and_the_twist_in_the_body(robot: Robot) 
     yaw = place(start)[2]
     forward = (place(end)[0] - place(start)[0], place(end)[1] - place(start)[1])
     assert math.atan2(forward[1], forward[0]) == pytest.approx(yaw, abs=1e-2)
-    assert odom.twist.twist.linear.z == odom.twist.twist.angular.x == odom.twist.twist.angular.y == 0
+    assert (
+        odom.twist.twist.linear.z == odom.twist.twist.angular.x == odom.twist.twist.angular.y == 0
+    )
 
 
 @pytest.mark.parametrize("velocity", [(0.5, 0, 0), (0, 0.5, 0), (0, 0, 1), (0.3, -0.2, 0.7)])
@@ -98,7 +110,9 @@ def test_the_wheels_turn_as_wheels_that_roll(
     seconds = last.header.stamp.seconds() - first.header.stamp.seconds()
     assert dict(zip(last.name, last.velocity, strict=True)) == pytest.approx(expected, abs=1e-3)
     for i, name in enumerate(last.name):
-        assert last.position[i] - first.position[i] == pytest.approx(expected[name] * seconds, abs=1e-4)
+        assert last.position[i] - first.position[i] == pytest.approx(
+            expected[name] * seconds, abs=1e-4
+        )
     robot.stop()
 
 
@@ -169,21 +183,28 @@ def test_the_fields_are_those_of_ros(robot: Robot, foreign: zenoh.Session) -> No
     assert list(odom["twist"]["twist"]) == ["linear", "angular"]
 
 
-def test_a_client_that_speaks_msgpack_drives_and_reads(robot: Robot, town: Wire) -> None:
-    bus = town.bus("packer", wire="msgpack")
+CDR_TWIST = "application/cdr;geometry_msgs/msg/Twist"
+
+
+def test_a_client_that_speaks_cdr_drives_and_reads(robot: Robot, town: Wire) -> None:
+    bus = town.bus("client", wire="cdr")
     odom, commands = record(bus, "odom", Odometry), bus.publisher("cmd_vel", Twist)
 
     def driven() -> bool:
         commands.put(Twist.planar(0.3))
         encodings = {received.encoding for received in robot.commands.all()}
-        return moves(odom.next(), 0.3, 0, 0) and "application/msgpack" in encodings
+        return moves(odom.next(), 0.3, 0, 0) and CDR_TWIST in encodings
 
     wait_for(driven)
 
 
-def test_a_sim_that_speaks_msgpack_is_read_and_driven_in_json(wire: Wire) -> None:
-    wire.start("sim", "--wire", "msgpack").wait_for_line("listens on")
+def test_a_sim_that_speaks_cdr_is_read_and_driven_in_json(wire: Wire) -> None:
+    wire.start("sim", "--wire", "cdr").wait_for_line("listens on")
     robot = Robot(wire.bus())
     robot.drive(0.3)
-    assert {received.encoding for received in robot.odom.all()} == {"application/msgpack"}
-    assert wire.run("topic", "echo", "odom", "--once").stdout.startswith("header:\n  stamp:\n    sec: ")
+    assert {received.encoding for received in robot.odom.all()} == {
+        "application/cdr;nav_msgs/msg/Odometry"
+    }
+    assert wire.run("topic", "echo", "odom", "--once").stdout.startswith(
+        "header:\n  stamp:\n    sec: "
+    )

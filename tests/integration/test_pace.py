@@ -13,7 +13,9 @@ pytestmark = pytest.mark.alone
 
 
 def advances(*flags: tuple[str, ...], span: float) -> list[float]:
-    """How far the time of sims with these flags goes while that of the first goes on by `span` seconds."""
+    """How far the time of sims with these flags goes while that of the first goes on by `span`
+    seconds.
+    """
     with contextlib.ExitStack() as ends:
         robots = []
         for words in flags:

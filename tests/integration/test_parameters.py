@@ -20,13 +20,19 @@ from .conftest import Verb
 from .robots import Robot, moves, rests, time_of
 
 DEFAULTS = {
-    "max_linear": 5.0, "max_angular": 10.0, "real_time_factor": 1.0, "command_timeout": 0.5, "odometry_rate": 50.0,
-}  # fmt: skip
+    "max_linear": 5.0,
+    "max_angular": 10.0,
+    "real_time_factor": 1.0,
+    "command_timeout": 0.5,
+    "odometry_rate": 50.0,
+}
 
 
 def put(bus: Bus, node: str, **values: r.Value) -> list[str]:
     """Set parameters; the reasons why not."""
-    request = r.SetParametersRequest([r.Parameter(name, r.ParameterValue.of(value)) for name, value in values.items()])
+    request = r.SetParametersRequest(
+        [r.Parameter(name, r.ParameterValue.of(value)) for name, value in values.items()]
+    )
     results = bus.call(f"{node}/set_parameters", request, r.SetParametersReply).results
     return [result.reason for result in results if not result.successful]
 
@@ -63,13 +69,26 @@ def test_a_lower_limit_applies_at_the_next_command(robot: Robot) -> None:
     robot.drive(x=0.5)
     assert put(robot.bus, "sim", max_linear=0.2) == []
     reason = "over the limits of 0.2 m/s"
-    robot.drive(x=0.5, until=lambda odom: moves(odom, 0.2, 0, 0) and reason in robot.last_status().last_refusal)
+    robot.drive(
+        x=0.5,
+        until=lambda odom: moves(odom, 0.2, 0, 0) and reason in robot.last_status().last_refusal,
+    )
 
 
 def test_a_robot_that_is_not_commanded_stands_whatever_is_set(robot: Robot) -> None:
     robot.drive(x=0.5)
     robot.stop()
-    assert put(robot.bus, "sim", command_timeout=2.0, max_linear=50.0, real_time_factor=2.0, odometry_rate=200.0) == []
+    assert (
+        put(
+            robot.bus,
+            "sim",
+            command_timeout=2.0,
+            max_linear=50.0,
+            real_time_factor=2.0,
+            odometry_rate=200.0,
+        )
+        == []
+    )
     assert still(robot, 0.5)
 
 
@@ -87,7 +106,9 @@ def still(robot: Robot, seconds: float) -> bool:
     return all(map(rests, odoms.messages()))
 
 
-def test_the_watchdog_can_be_shortened_but_not_switched_off(lock_step: Callable[..., LockStep]) -> None:
+def test_the_watchdog_can_be_shortened_but_not_switched_off(
+    lock_step: Callable[..., LockStep],
+) -> None:
     sim = lock_step()
     for value in (0.0, -1.0, 0.04, 3.0):
         reason = f"command_timeout: {value:g}: use a number from 0.05 to 2 s"
@@ -122,10 +143,14 @@ def test_simulated_time_goes_at_the_pace_that_is_set(robot: Robot) -> None:
 
 
 def test_a_robot_with_a_name_has_its_own(verb: Verb, town: Wire, robot: Robot) -> None:
-    assert verb(town, "spawn", "urdf/hb_bot.urdf.xacro", "--name", "Fred", "-x", "3").returncode == 0
+    assert (
+        verb(town, "spawn", "urdf/hb_bot.urdf.xacro", "--name", "Fred", "-x", "3").returncode == 0
+    )
     try:
         assert put(robot.bus, "sim", **{"Fred.command_timeout": 1.0}) == []
-        names = robot.bus.call("sim/list_parameters", r.ListParametersRequest(), r.ListParametersReply).result.names
+        names = robot.bus.call(
+            "sim/list_parameters", r.ListParametersRequest(), r.ListParametersReply
+        ).result.names
         assert {"Fred.command_timeout", "Fred.odometry_rate", "command_timeout"} <= set(names)
     finally:
         assert verb(town, "delete", "Fred").returncode == 0
@@ -174,7 +199,9 @@ def test_the_pose_service_hands_out_another_shape_at_once(wire: Wire) -> None:
     assert bus.call("next_goal", NextGoalRequest(5), NextGoalReply).end_of_list == 1
 
 
-@pytest.mark.parametrize(("service", "node"), [("pose-service", "pose_service"), ("controller", "controller")])
+@pytest.mark.parametrize(
+    ("service", "node"), [("pose-service", "pose_service"), ("controller", "controller")]
+)
 def test_the_second_of_a_kind_names_the_first_and_a_hung_one_is_named(
     verb: Verb, wire: Wire, service: str, node: str
 ) -> None:

@@ -16,7 +16,9 @@ def rows(bus: Bus, node: str) -> list[str]:
     """A node's part of the table."""
     listed = bus.call(f"{node}/list_parameters", r.ListParametersRequest(), r.ListParametersReply)
     asked = r.DescribeParametersRequest(listed.result.names)
-    described = bus.call(f"{node}/describe_parameters", asked, r.DescribeParametersReply).descriptors
+    described = bus.call(
+        f"{node}/describe_parameters", asked, r.DescribeParametersReply
+    ).descriptors
     return [_row(node, one) for one in described]
 
 
@@ -35,8 +37,14 @@ def test_the_table_is_current_and_the_call_of_the_page_works(verb: Verb, wire: W
     wire.start("controller")
     wire.start("pose-service")
     bus = wire.bus()
-    shown = re.search(r"\|---\|---\|---\|---\|\n(.*?)\n<!-- /parameters -->", PAGE.read_text(), re.DOTALL)
+    shown = re.search(
+        r"\|---\|---\|---\|---\|\n(.*?)\n<!-- /parameters -->", PAGE.read_text(), re.DOTALL
+    )
     assert shown
-    assert shown[1].splitlines() == [row for node in ("sim", "controller", "pose_service") for row in rows(bus, node)]
-    done = verb(wire, "service", "call", "sim/get_parameters", '{"names": ["max_linear"]}', "--json")
+    assert shown[1].splitlines() == [
+        row for node in ("sim", "controller", "pose_service") for row in rows(bus, node)
+    ]
+    done = verb(
+        wire, "service", "call", "sim/get_parameters", '{"names": ["max_linear"]}', "--json"
+    )
     assert (done.returncode, '"double_value": 5.0' in done.stdout) == (0, True), done.stderr

@@ -1,4 +1,6 @@
-"""scripts/play: an empty world, a robot under a name, keys in the terminal, and nothing left afterwards."""
+"""scripts/play: an empty world, a robot under a name, keys in the terminal, and nothing left
+afterwards.
+"""
 
 import os
 import signal
@@ -66,7 +68,9 @@ def played(game: Game, name: str = "Fred") -> Robot:
     return robot
 
 
-def test_fred_drives_in_an_empty_world_and_quitting_leaves_nothing_and_the_terminal_as_it_was(game: Game) -> None:
+def test_fred_drives_in_an_empty_world_and_quitting_leaves_nothing_and_the_terminal_as_it_was(
+    game: Game,
+) -> None:
     played(game)
     assert entities.names(game.wire.bus()) == ["Fred"]
     game.terminal.type("\x03")
@@ -75,7 +79,9 @@ def test_fred_drives_in_an_empty_world_and_quitting_leaves_nothing_and_the_termi
     assert game.terminal.modes() == game.terminal.modes_before
 
 
-def test_another_sim_on_the_same_keys_is_reported_and_a_signal_ends_all_of_it(house: Path, game: Game) -> None:
+def test_another_sim_on_the_same_keys_is_reported_and_a_signal_ends_all_of_it(
+    house: Path, game: Game
+) -> None:
     robot = played(game)
     before, temporary = game.left()
     other = Game(house, game.wire)
@@ -100,7 +106,9 @@ def test_a_closed_terminal_ends_all_of_it(game: Game) -> None:
 
 
 @pytest.mark.needs("setpriv")
-def test_another_robot_plays_under_another_name_and_killed_it_leaves_nothing_running(house: Path, wire: Wire) -> None:
+def test_another_robot_plays_under_another_name_and_killed_it_leaves_nothing_running(
+    house: Path, wire: Wire
+) -> None:
     game = Game(house, wire, str(REPO / "urdf" / "rover.urdf.xacro"), "Rosie")
     try:
         played(game, "Rosie")
@@ -122,7 +130,9 @@ def test_another_robot_plays_under_another_name_and_killed_it_leaves_nothing_run
 def test_an_error_is_reported_and_leaves_nothing_behind(
     house: Path, wire: Wire, words: list[str], expected: str
 ) -> None:
-    game = Game(house, wire, *(str(house / word) if word.startswith("urdf") else word for word in words))
+    game = Game(
+        house, wire, *(str(house / word) if word.startswith("urdf") else word for word in words)
+    )
     game.terminal.process.wait(30)
     assert game.terminal.process.returncode in (1, 2)
     wait_for(lambda: expected in game.terminal.raw)
@@ -131,7 +141,9 @@ def test_an_error_is_reported_and_leaves_nothing_behind(
 
 
 def test_without_a_terminal_it_reports_that(house: Path, temporary: Path) -> None:
-    play = subprocess.run([house / "scripts" / "play"], stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    play = subprocess.run(
+        [house / "scripts" / "play"], stdin=subprocess.DEVNULL, capture_output=True, text=True
+    )
     assert play.returncode == 2
     assert len(play.stderr.splitlines()) == 1
     assert "needs a terminal" in play.stderr

@@ -20,13 +20,17 @@ from .robots import Robot, place, time_of
 HALF = math.sqrt(3) / 2
 PI = math.pi
 
-# Corners in metres for a size of 2, from the second on: each shape begins at the origin and ends there.
+# Corners in metres for a size of 2, from the second on: each shape begins at the origin and ends
+# there.
 CORNERS: dict[str, list[tuple[float, float]]] = {
     "square": [(2, 0), (2, 2), (0, 2), (0, 0)],
     "triangle": [(2, 0), (1, 2 * HALF), (0, 0)],
     "rectangle": [(2, 0), (2, 1), (0, 1), (0, 0)],
     "hexagon": [(2, 0), (3, 2 * HALF), (2, 4 * HALF), (0, 4 * HALF), (-1, 2 * HALF), (0, 0)],
-    "infinity": [(2 * math.sin(t), 2 * math.sin(t) * math.cos(t)) for t in (i * PI / 12 for i in range(1, 25))],
+    "infinity": [
+        (2 * math.sin(t), 2 * math.sin(t) * math.cos(t))
+        for t in (i * PI / 12 for i in range(1, 25))
+    ],
 }
 
 
@@ -52,7 +56,9 @@ def ask(session: zenoh.Session, selector: str, payload: bytes | None = None) -> 
 
 
 @pytest.mark.parametrize("shape", CORNERS)
-def test_every_goal_of_every_shape_is_a_corner_and_looks_at_the_next(wire: Wire, shape: str) -> None:
+def test_every_goal_of_every_shape_is_a_corner_and_looks_at_the_next(
+    wire: Wire, shape: str
+) -> None:
     start(wire, "--shape", shape, "--size", "2")
     bus, corners = wire.bus(), CORNERS[shape]
     goals = [bus.call("next_goal", NextGoalRequest(i), NextGoalReply) for i in range(len(corners))]
@@ -61,7 +67,9 @@ def test_every_goal_of_every_shape_is_a_corner_and_looks_at_the_next(wire: Wire,
         look = math.atan2(ahead[1] - corner[1], ahead[0] - corner[0])
         assert math.remainder(goal.theta_goal - look, math.tau) == pytest.approx(0, abs=1e-6)
     assert [goal.end_of_list for goal in goals] == [0] * (len(corners) - 1) + [1]
-    with pytest.raises(ServiceError, match=f"goal {len(corners)}: the list holds goals 0 to {len(corners) - 1}"):
+    with pytest.raises(
+        ServiceError, match=f"goal {len(corners)}: the list holds goals 0 to {len(corners) - 1}"
+    ):
         bus.call("next_goal", NextGoalRequest(len(corners)), NextGoalReply)
 
 
@@ -72,7 +80,9 @@ def test_past_either_end_of_the_list_there_is_a_reason(service: Any, number: int
     assert service(0).x_goal == 1
 
 
-def test_a_foreign_node_asks_by_the_selector(town: Wire, service: Any, foreign: zenoh.Session) -> None:
+def test_a_foreign_node_asks_by_the_selector(
+    town: Wire, service: Any, foreign: zenoh.Session
+) -> None:
     ok, _ = ask(foreign, "next_goal?request_goal=1")
     assert ok == {"x_goal": 1, "y_goal": 1, "theta_goal": pytest.approx(PI), "end_of_list": 0}
 
@@ -82,13 +92,29 @@ def test_a_wrong_request_gets_an_error_reply_and_the_service_goes_on(
 ) -> None:
     for selector, payload, reason in [
         ("next_goal?request_goal=9", None, "goal 9: the list holds goals 0 to 3"),
-        ("next_goal?request_goal=one", None, "not a NextGoalRequest: Expected `int`, got `str` - at `$.request_goal`"),
+        (
+            "next_goal?request_goal=one",
+            None,
+            "not a NextGoalRequest: Expected `int`, got `str` - at `$.request_goal`",
+        ),
         ("next_goal?goal=1", None, "not a NextGoalRequest: Object contains unknown field `goal`"),
-        ("next_goal", b'{"request_goal":1.5}', "not a NextGoalRequest: Expected `int`, got `float`"),
-        ("next_goal", b'{"request":1}', "not a NextGoalRequest: Object contains unknown field `request`"),
+        (
+            "next_goal",
+            b'{"request_goal":1.5}',
+            "not a NextGoalRequest: Expected `int`, got `float`",
+        ),
+        (
+            "next_goal",
+            b'{"request":1}',
+            "not a NextGoalRequest: Object contains unknown field `request`",
+        ),
         ("next_goal", b"{", "not a NextGoalRequest: "),
         ("next_goal", b"[" * 50_000, "not a NextGoalRequest: "),
-        ("next_goal", b'{"request_goal":99999999999999999999999}', "goal 99999999999999999999999: the list"),
+        (
+            "next_goal",
+            b'{"request_goal":99999999999999999999999}',
+            "goal 99999999999999999999999: the list",
+        ),
         ("next_goal", b" " * 5_000_001, "request of 5000001 bytes; at most 5000000 are read"),
         ("get_pose", b'{"name":"nobody"}', "no nobody/odom was received; robots with odom: none"),
         ("get_pose", b'{"name":"a/b"}', "robot name 'a/b': use a letter, then"),
@@ -101,13 +127,17 @@ def test_a_wrong_request_gets_an_error_reply_and_the_service_goes_on(
 
 
 def test_goals_from_a_file_are_handed_out_as_they_stand(wire: Wire, tmp_path: Path) -> None:
-    (tmp_path / "goals.txt").write_text("# x y theta\n1.5 -2 0.5\n\n3, 4   # looks along x\n-1e-3,0,-3.1\n")
+    (tmp_path / "goals.txt").write_text(
+        "# x y theta\n1.5 -2 0.5\n\n3, 4   # looks along x\n-1e-3,0,-3.1\n"
+    )
     start(wire, "--goals", str(tmp_path / "goals.txt"))
     bus = wire.bus()
     goals = [bus.call("next_goal", NextGoalRequest(i), NextGoalReply) for i in range(3)]
     assert [(g.x_goal, g.y_goal, g.theta_goal, g.end_of_list) for g in goals] == [
-        (1.5, -2, 0.5, 0), (3, 4, 0, 0), (-1e-3, 0, -3.1, 1),
-    ]  # fmt: skip
+        (1.5, -2, 0.5, 0),
+        (3, 4, 0, 0),
+        (-1e-3, 0, -3.1, 1),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -133,7 +163,9 @@ def test_a_file_of_goals_that_is_wrong_is_named_with_its_line(
         (["--size", "0"], 2, "'0': use a number from 0.01 to 1000 m"),
     ],
 )
-def test_a_wrong_flag_is_one_error_line(verb: Verb, town: Wire, words: list[str], code: int, reason: str) -> None:
+def test_a_wrong_flag_is_one_error_line(
+    verb: Verb, town: Wire, words: list[str], code: int, reason: str
+) -> None:
     assert_one_line(verb(town, "pose-service", *words), code, reason)
 
 
@@ -161,7 +193,9 @@ def test_get_pose_returns_the_last_odom_until_it_is_stale(wire: Wire) -> None:
     wait_for(lambda: time_of(pose().odom) >= time_of(before), what="that odom to reach the service")
     assert place(pose().odom) == pytest.approx(place(before), abs=1e-3)
     wait_for(lambda: 0 <= pose().age < 0.2, what="the age of an odom that just came")
-    with pytest.raises(ServiceError, match=r"^no Fred/odom was received; robots with odom: '' \(at the root\)$"):
+    with pytest.raises(
+        ServiceError, match=r"^no Fred/odom was received; robots with odom: '' \(at the root\)$"
+    ):
         pose("Fred")
     sim.kill()
     wait_for(lambda: fails("odom is stale: the last one came "))
@@ -175,4 +209,6 @@ def test_get_pose_knows_robots_by_name(wire: Wire) -> None:
     with zenoh.open(foreign_config(wire)) as session:
         pose = wait_for(lambda: ask(session, "get_pose?name=Fred")[0])
         assert pose["odom"]["header"]["frame_id"] == "Fred/odom"
-        assert ask(session, "get_pose?name=Ann")[1] == {"error": "no Ann/odom was received; robots with odom: Fred"}
+        assert ask(session, "get_pose?name=Ann")[1] == {
+            "error": "no Ann/odom was received; robots with odom: Fred"
+        }

@@ -1,7 +1,10 @@
-"""With `--private` the processes of one user meet at Unix sockets that no other user reaches, and open no port."""
+"""With `--private` the processes of one user meet at Unix sockets that no other user reaches, and
+open no port.
+"""
 
 import contextlib
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -16,7 +19,6 @@ from holozen.testing import Process, wait_for
 from holozen.testing.wire import command
 from holozen.transport.connection import from_environment
 from holozen.transport.errors import BusError
-from holozen.transport.listeners import holders
 from holozen.transport.private import folder
 
 Start = Callable[..., Process]
@@ -52,7 +54,8 @@ def ports(pid: int) -> set[str]:
         for table in ("tcp", "tcp6", "udp", "udp6", "raw", "packet")
         for line in Path(f"/proc/{pid}/net/{table}").read_text().splitlines()[1:]
     ]
-    numbers = {column for row in rows for column in row[8:10]}  # the inode's column, also of `packet`
+    # the inode's column, also of `packet`
+    numbers = {column for row in rows for column in row[8:10]}
     links = []
     for link in Path(f"/proc/{pid}/fd").iterdir():
         with contextlib.suppress(FileNotFoundError):  # closed by now
@@ -60,13 +63,16 @@ def ports(pid: int) -> set[str]:
     return {link for link in links if link.startswith("socket:") and link[8:-1] in numbers}
 
 
-def test_a_robot_is_driven_without_any_port_and_processes_meet_after_the_holder_died(start: Start) -> None:
+def test_a_robot_is_driven_without_any_port_and_processes_meet_whoever_dies(start: Start) -> None:
     sim = start("sim")
     sim.wait_for_line("listens on")
     service = start("pose-service")
     service.wait_for_line("goal")
     with Bus("driver") as bus:
-        odom, commands = bus.latest("odom", Odometry), bus.publisher("cmd_vel", Twist, "INTERACTIVE_HIGH")
+        odom, commands = (
+            bus.latest("odom", Odometry),
+            bus.publisher("cmd_vel", Twist, "INTERACTIVE_HIGH"),
+        )
 
         def moves() -> bool:
             commands.put(Twist.planar(x=0.3))
@@ -75,18 +81,43 @@ def test_a_robot_is_driven_without_any_port_and_processes_meet_after_the_holder_
 
         wait_for(moves)
         assert ports(sim.pid) == ports(service.pid) == set()
-    first = from_environment().meeting_points[0]
-    assert [holder.pid for holder in holders(first)] == [sim.pid]
     sim.kill()
-    wait_for(lambda: [holder.pid for holder in holders(first)] == [service.pid])
+    late = start("pose-service")
+    late.wait_for_line("goal")
 
     def listed() -> str:
         listing = start("node", "list")
         assert listing.wait() == 0
         return listing.out
 
-    # It links to the new holder at once, and to the service only when that has introduced them.
-    wait_for(lambda: listed() == "pose_service\n")
+    assert listed() == "pose_service\npose_service\n"
+
+
+def test_domains_are_kept_apart_in_private_too(start: Start) -> None:
+    start("pose-service").wait_for_line("goal")
+    other = start("node", "list", "--domain", "1")
+    assert (other.wait(), other.out) == (0, "")
+    same = start("node", "list")
+    assert (same.wait(), same.out) == (0, "pose_service\n")
+
+
+def test_one_that_is_suspended_in_private_delays_nobody_and_is_met_when_it_wakes_up(
+    start: Start,
+) -> None:
+    asleep = start("pose-service")
+    asleep.wait_for_line("goal")
+    asleep.signal(signal.SIGSTOP)
+    start("sim").wait_for_line("listens on")
+    listing = start("node", "list")
+    assert (listing.wait(), listing.out) == (0, "sim\n")
+    asleep.signal(signal.SIGCONT)
+
+    def listed() -> str:
+        listing = start("node", "list")
+        listing.wait()
+        return listing.out
+
+    wait_for(lambda: listed() == "pose_service\nsim\n")
 
 
 def test_a_router_and_its_client_are_private_too(start: Start) -> None:
@@ -116,19 +147,25 @@ try:
     folder()
 except BusError as error:
     print(error)
-"""
+"""  # noqa: E501
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root becomes another user")
 def test_another_user_gets_in_nowhere(start: Start, runtime: Path) -> None:
     start("pose-service").wait_for_line("goal")
     sockets = [str(one) for one in Path(folder()).iterdir() if one.is_socket()]
-    assert len(sockets) == 2
+    assert len(sockets) == 1
     runtime.chmod(0o755)  # so that the folder inside is all that keeps other users out
     endpoints = [f"unixsock-stream/{path}" for path in sockets]
-    done = subprocess.run([sys.executable, "-c", FOREIGN_NODE, *endpoints], capture_output=True, text=True, timeout=30)
+    done = subprocess.run(
+        [sys.executable, "-c", FOREIGN_NODE, *endpoints], capture_output=True, text=True, timeout=30
+    )
     assert done.stderr == ""
-    assert done.stdout == f"cannot be private in {folder()}: it is not a folder of yours with mode 0700; remove it\n"
+    assert (
+        done.stdout
+        == f"cannot be private in {folder()}: it is not a folder of yours with mode 0700; remove "
+        "it\n"
+    )
 
 
 def readable(path: Path) -> None:
@@ -158,15 +195,21 @@ def missing(path: Path) -> None:
         (missing, "No such file or directory; unset XDG_RUNTIME_DIR"),
     ],
 )
-def test_a_folder_that_others_could_enter_is_refused(runtime: Path, spoil: Callable[[Path], None], reason: str) -> None:
+def test_a_folder_that_others_could_enter_is_refused(
+    runtime: Path, spoil: Callable[[Path], None], reason: str
+) -> None:
     spoil(runtime)
     with pytest.raises(BusError) as error:
         from_environment()
-    assert str(error.value).startswith(f"cannot be private in {runtime}/holozen: {reason.format(runtime)}")
+    assert str(error.value).startswith(
+        f"cannot be private in {runtime}/holozen: {reason.format(runtime)}"
+    )
     runtime.mkdir(exist_ok=True)  # for its removal
 
 
-def test_a_folder_of_another_user_is_refused(runtime: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_of_another_user_is_refused(
+    runtime: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder()
     monkeypatch.setattr(os, "geteuid", lambda: 65534)
     with pytest.raises(BusError, match="cannot be private in "):
@@ -184,23 +227,28 @@ def test_without_a_runtime_folder_it_is_a_folder_of_the_user_in_tmp(
 def test_the_sockets_of_killed_processes_are_removed_and_of_others_kept(start: Start) -> None:
     service, killed = start("pose-service"), start("controller")
     service.wait_for_line("goal")
-    wait_for(lambda: [*Path(folder()).glob(f"{killed.pid}-*")])
+    wait_for(lambda: [*Path(folder()).glob(f"0-{killed.pid}-*")])
     killed.kill()
     folder()
-    wait_for(lambda: not [*Path(folder()).glob(f"{killed.pid}-*")])
-    assert len([*Path(folder()).glob(f"{service.pid}-*")]) == 2
+    wait_for(lambda: not [*Path(folder()).glob(f"0-{killed.pid}-*")])
+    assert len([*Path(folder()).glob(f"0-{service.pid}-*")]) == 2
 
 
 @pytest.mark.parametrize(
     ("flag", "value"),
-    [("--listen", "tcp/0.0.0.0:7447"), ("--connect", "tcp/127.0.0.1:7447"), ("--config", os.devnull)],
+    [
+        ("--listen", "tcp/0.0.0.0:7447"),
+        ("--connect", "tcp/127.0.0.1:7447"),
+        ("--config", os.devnull),
+    ],
 )
 def test_what_would_open_a_port_is_refused(start: Start, flag: str, value: str) -> None:
     listing = start("node", "list", flag, value)
     assert listing.wait() == 2
     variable = f"HOLOZEN_{flag[2:].upper()}"
     assert listing.err == (
-        f"holozen: --private (or HOLOZEN_PRIVATE) excludes {flag}: leave it out, and unset {variable}\n"
+        f"holozen: --private (or HOLOZEN_PRIVATE) excludes {flag}: leave it out, and unset "
+        f"{variable}\n"
     )
     setting = start("node", "list", "--cfg", 'listen/endpoints:["tcp/0.0.0.0:7447"]')
     assert setting.wait() == 2

@@ -1,8 +1,9 @@
-"""`holozen topic pub` checks that what it writes arrives, is valid and is obeyed, or reports why not."""
+"""`holozen topic pub` checks that what it writes arrives, is valid and is obeyed, or reports why
+not.
+"""
 
 import json
 import os
-import signal
 import subprocess
 import threading
 
@@ -30,9 +31,17 @@ def test_it_reports_the_number_of_subscribers(verb: Verb, town: Wire, robot: Rob
         done = verb(town, "topic", "pub", "cmd_vel", AHEAD, "--once")
         return (done.returncode, done.stdout, done.stderr) == (0, "", "2 subscribers of cmd_vel\n")
 
-    wait_for(reported)  # a busy machine may discover one of them late, or make a single command too old
-    output = json.loads(verb(town, "topic", "pub", "cmd_vel", "{}", "-t", "2", "-w", "2", "--json").stdout)
-    assert output == {"key": "cmd_vel", "type": "geometry_msgs/msg/Twist", "subscribers": 2, "published": 2}
+    # a busy machine may discover one of them late, or make a single command too old
+    wait_for(reported)
+    output = json.loads(
+        verb(town, "topic", "pub", "cmd_vel", "{}", "-t", "2", "-w", "2", "--json").stdout
+    )
+    assert output == {
+        "key": "cmd_vel",
+        "type": "geometry_msgs/msg/Twist",
+        "subscribers": 2,
+        "published": 2,
+    }
 
 
 def test_a_goal_that_is_only_looked_at_is_reported(verb: Verb, wire: Wire) -> None:
@@ -56,12 +65,26 @@ def test_it_waits_for_as_many_subscribers_as_requested(town: Wire, robot: Robot)
 
 
 def test_it_gives_up_waiting_when_asked(verb: Verb, town: Wire) -> None:
-    done = verb(town, "topic", "pub", "nobody", "geometry_msgs/msg/Twist", AHEAD, "-1", "-w", "1", "--max-wait", "0.1")
+    done = verb(
+        town,
+        "topic",
+        "pub",
+        "nobody",
+        "geometry_msgs/msg/Twist",
+        AHEAD,
+        "-1",
+        "-w",
+        "1",
+        "--max-wait",
+        "0.1",
+    )
     assert done.returncode == 1
     assert done.stderr.startswith("holozen topic pub: no subscribers of nobody")
 
 
-def test_fewer_subscribers_than_requested_are_not_enough(verb: Verb, town: Wire, robot: Robot) -> None:
+def test_fewer_subscribers_than_requested_are_not_enough(
+    verb: Verb, town: Wire, robot: Robot
+) -> None:
     done = verb(town, "topic", "pub", "cmd_vel", "{}", "-1", "-w", "9", "--max-wait", "0.2")
     assert done.returncode == 1
     assert "cmd_vel: 9 subscribers did not come in time, so nothing is published" in done.stderr
@@ -69,7 +92,9 @@ def test_fewer_subscribers_than_requested_are_not_enough(verb: Verb, town: Wire,
 
 def test_it_needs_no_subscriber_where_it_does_not_wait(verb: Verb, town: Wire) -> None:
     for flags in (("--no-wait",), ("-w", "0")):
-        done = verb(town, "topic", "pub", "nobody", "geometry_msgs/msg/Twist", AHEAD, "--once", *flags)
+        done = verb(
+            town, "topic", "pub", "nobody", "geometry_msgs/msg/Twist", AHEAD, "--once", *flags
+        )
         assert (done.returncode, done.stderr) == (0, "")
 
 
@@ -82,8 +107,12 @@ def test_it_needs_no_subscriber_where_it_does_not_wait(verb: Verb, town: Wire) -
         ("linear: {x: .inf}", "linear.x is not a finite number; --force sends it all the same"),
     ],
 )
-def test_a_wrong_field_is_refused_with_the_closest_name(verb: Verb, town: Wire, value: str, expected: str) -> None:
-    assert_one_line(verb(town, "topic", "pub", "cmd_vel", value, "--once"), 1, "refused: ", expected)
+def test_a_wrong_field_is_refused_with_the_closest_name(
+    verb: Verb, town: Wire, value: str, expected: str
+) -> None:
+    assert_one_line(
+        verb(town, "topic", "pub", "cmd_vel", value, "--once"), 1, "refused: ", expected
+    )
 
 
 @pytest.mark.parametrize(
@@ -91,7 +120,11 @@ def test_a_wrong_field_is_refused_with_the_closest_name(verb: Verb, town: Wire, 
     [
         ("cmd_vel", '{"linear": {"x": 1e308}}', "linear.x is 1e+308 m/s; at most 100"),
         ("Fred/cmd_vel", "twist: {angular: {y: -1001}}", "angular.y is -1001 rad/s; at most 1000"),
-        ("joint_command", "{name: [j], velocity: [2e3]}", "velocity[0] of joint 'j' is 2000; at most 1000"),
+        (
+            "joint_command",
+            "{name: [j], velocity: [2e3]}",
+            "velocity[0] of joint 'j' is 2000; at most 1000",
+        ),
     ],
 )
 def test_what_no_robot_can_mean_is_refused_and_not_sent(
@@ -107,14 +140,17 @@ def test_what_no_robot_can_mean_is_refused_and_not_sent(
 def test_a_type_that_the_key_does_not_carry_is_refused(verb: Verb, town: Wire) -> None:
     words = ("topic", "pub", "cmd_vel", "nav_msgs/msg/Odometry", "{}", "--once", "--no-wait")
     expected = (
-        "cmd_vel: its type is geometry_msgs/msg/Twist or geometry_msgs/msg/TwistStamped, not nav_msgs/msg/Odometry"
+        "cmd_vel: its type is geometry_msgs/msg/Twist or geometry_msgs/msg/TwistStamped, "
+        "not nav_msgs/msg/Odometry"
     )
     assert_one_line(verb(town, *words), 1, expected)
     assert verb(town, *words, "--force").returncode == 0
 
 
-@pytest.mark.parametrize("wire_name", ["json", "msgpack"])
-def test_force_sends_what_the_sim_then_refuses_and_reports_it(town: Wire, robot: Robot, wire_name: str) -> None:
+@pytest.mark.parametrize("wire_name", ["json", "cdr"])
+def test_force_sends_what_the_sim_then_refuses_and_reports_it(
+    town: Wire, robot: Robot, wire_name: str
+) -> None:
     words = ["{linear: {x: .nan}}", "-r", "20", "--force", "--wire", wire_name]
     pub = town.start("topic", "pub", "cmd_vel", *words)
     pub.wait_for_line("not obeyed: ")
@@ -122,10 +158,20 @@ def test_force_sends_what_the_sim_then_refuses_and_reports_it(town: Wire, robot:
     robot.stands()
 
 
+def test_a_robot_that_stands_between_slow_commands_has_obeyed_them(
+    verb: Verb, town: Wire, robot: Robot
+) -> None:
+    done = verb(town, "topic", "pub", "cmd_vel", AHEAD, "-r", "1", "--times", "1")
+    assert (done.returncode, "not obeyed" in done.stderr) == (0, False)
+
+
 def test_to_a_stopped_robot_it_fails_and_says_so(verb: Verb, town: Wire, robot: Robot) -> None:
     assert verb(town, "stop").returncode == 0
     try:
-        ended = [verb(town, "topic", "pub", "cmd_vel", *often, AHEAD) for often in (["--once"], ["-t", "2"])]
+        ended = [
+            verb(town, "topic", "pub", "cmd_vel", *often, AHEAD)
+            for often in (["--once"], ["-t", "2"])
+        ]
     finally:
         assert verb(town, "release").returncode == 0
     for done in ended:
@@ -133,7 +179,9 @@ def test_to_a_stopped_robot_it_fails_and_says_so(verb: Verb, town: Wire, robot: 
         assert "not obeyed: stop@" in done.stderr and "has set the software stop" in done.stderr
 
 
-def test_of_a_paused_sim_it_says_so_instead_of_to_try_again(verb: Verb, town: Wire, robot: Robot) -> None:
+def test_of_a_paused_sim_it_says_so_instead_of_to_try_again(
+    verb: Verb, town: Wire, robot: Robot
+) -> None:
     """What drove before the pause counts until the sim plays, as time stands still."""
     person = town.bus("person", lasting=True)
     commands = person.publisher("cmd_vel", Twist, "INTERACTIVE_HIGH", dead_man=False)
@@ -150,14 +198,20 @@ def test_of_a_paused_sim_it_says_so_instead_of_to_try_again(verb: Verb, town: Wi
         done = verb(town, "topic", "pub", "cmd_vel", AHEAD, "-t", "5", "-r", "10")
     finally:
         assert verb(town, "sim", "play").returncode == 0
-    assert (done.returncode, done.stderr.splitlines()[-1].startswith("not obeyed: ")) == (1, True), done.stderr
+    assert (done.returncode, done.stderr.splitlines()[-1].startswith("not obeyed: ")) == (
+        1,
+        True,
+    ), done.stderr
     assert done.stderr.endswith("; the sim is paused; `holozen sim play` continues it\n")
     assert verb(town, "service", "call", "resume").returncode == 0
 
 
 def test_a_misspelt_key_is_refused_with_the_closest(verb: Verb, town: Wire, robot: Robot) -> None:
     for key, meant in (("cmd_vl", "cmd_vel"), ("Fred/cmd_vle", "Fred/cmd_vel")):
-        expected = f"holozen topic pub: '{key}' has no known type (did you mean '{meant}'?); known keys: cmd_vel, odom"
+        expected = (
+            f"holozen topic pub: '{key}' has no known type (did you mean '{meant}'?); "
+            "known keys: cmd_vel, odom"
+        )
         assert_one_line(verb(town, "topic", "pub", key, AHEAD, "--once"), 1, expected)
 
 
@@ -167,20 +221,26 @@ def test_numbers_are_those_of_json_in_yaml_too(verb: Verb, wire: Wire) -> None:
     assert heard.recv().message == Twist.planar(0.2)
 
 
-def test_it_reports_when_another_one_drives_and_when_it_is_obeyed(town: Wire, robot: Robot) -> None:
+def test_it_reports_when_another_one_drives_and_that_it_has_to_let_go_then(
+    town: Wire, robot: Robot
+) -> None:
     first = town.start("topic", "pub", "cmd_vel", AHEAD)
     robot.odom.next(lambda odom: moves(odom, 0.2, 0, 0))
     second = town.start("topic", "pub", "cmd_vel", '{"linear": {"y": 0.1}}')
     assert "drives" in second.wait_for_line("not obeyed: topic_pub@")
-    first.signal(signal.SIGINT)
-    second.wait_for_line("obeyed again")
+    assert first.interrupt() == 0
+    assert "be silent for 0.5 s" in second.wait_for_line("not obeyed: let go first: ")
+    robot.odom.next(lambda odom: moves(odom, 0, 0, 0))
+    assert second.interrupt() == 0
+    third = town.start("topic", "pub", "cmd_vel", '{"linear": {"y": 0.1}}')
     robot.odom.next(lambda odom: moves(odom, 0, 0.1, 0))
-    second.signal(signal.SIGINT)
-    assert (first.wait(), second.wait()) == (0, 0)
+    assert third.interrupt() == 0
     robot.stands()
 
 
-def test_a_forced_mistake_is_named_also_where_another_one_drives(verb: Verb, town: Wire, robot: Robot) -> None:
+def test_a_forced_mistake_is_named_also_where_another_one_drives(
+    verb: Verb, town: Wire, robot: Robot
+) -> None:
     driver = town.start("topic", "pub", "cmd_vel", AHEAD)
     robot.odom.next(lambda odom: moves(odom, 0.2, 0, 0))
     done = verb(town, "topic", "pub", "cmd_vel", '{"linear": {"x": 1e308}}', "--once", "--force")
@@ -196,7 +256,9 @@ def test_it_reports_that_the_sim_drives_slower_than_shown(town: Wire, robot: Rob
     robot.stands()
 
 
-def test_lines_of_standard_input_are_published_and_the_robot_stops_at_their_end(town: Wire, robot: Robot) -> None:
+def test_lines_of_standard_input_are_published_and_the_robot_stops_at_their_end(
+    town: Wire, robot: Robot
+) -> None:
     words = command("topic", "pub", "cmd_vel", "--stdin", *town.flags)
     with subprocess.Popen(words, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as pub:
         assert pub.stdin and pub.stderr
@@ -225,13 +287,15 @@ def test_lines_of_standard_input_are_published_and_the_robot_stops_at_their_end(
         ("joint_command", JointState, ["{name: [a], effort: [1]}"], [still("a")]),
         ("joint_command", JointState, ["{name: [a], position: [1]}"], []),
         (
-            "joint_command", JointState, ["{name: [a], velocity: [1]}", "{name: [b], velocity: [1]}"],
+            "joint_command",
+            JointState,
+            ["{name: [a], velocity: [1]}", "{name: [b], velocity: [1]}"],
             [still("a"), still("b")],
         ),
         ("Ann/gazebo_ros_force", Wrench, ["{force: {x: 1}}"], [Wrench()]),
     ],
     ids=["rates", "efforts", "positions", "one by one", "force"],
-)  # fmt: skip
+)
 def test_at_the_end_it_stops_whatever_it_moved(
     wire: Wire, key: str, kind: type[Message], lines: list[str], stops: list[Message]
 ) -> None:
@@ -239,7 +303,10 @@ def test_at_the_end_it_stops_whatever_it_moved(
     done = wire.run("topic", "pub", key, "--stdin", given="\n".join(lines))
     assert done.returncode == 0, done.stderr
     wanted = sorted(map(repr, 5 * stops))
-    wait_for(lambda: sorted(map(repr, heard.messages()[len(lines) :])) == wanted, what=f"{wanted} in the end")
+    wait_for(
+        lambda: sorted(map(repr, heard.messages()[len(lines) :])) == wanted,
+        what=f"{wanted} in the end",
+    )
 
 
 def test_ctrl_c_stops_the_joints(wire: Wire) -> None:
@@ -274,8 +341,13 @@ def test_any_type_is_published_with_its_fields(verb: Verb, town: Wire) -> None:
             assert json.loads(echo.out)["ranges"] == [1.0, 2.5]
         echo = town.start("topic", "echo", "scan", "--once", "--json")
     echo.close()
-    expected = "holozen topic pub: scan: no type 'sensor_msgs/msg/LaserScn' (did you mean 'sensor_msgs/msg/LaserScan'?)"
-    assert_one_line(verb(town, "topic", "pub", "scan", "sensor_msgs/msg/LaserScn", "--once"), 1, expected)
+    expected = (
+        "holozen topic pub: scan: no type 'sensor_msgs/msg/LaserScn' (did you mean "
+        "'sensor_msgs/msg/LaserScan'?)"
+    )
+    assert_one_line(
+        verb(town, "topic", "pub", "scan", "sensor_msgs/msg/LaserScn", "--once"), 1, expected
+    )
 
 
 def test_lost_samples_are_counted_by_the_publishers_numbers(town: Wire) -> None:
@@ -329,9 +401,15 @@ def test_a_sim_that_receives_no_command_is_no_success(verb: Verb, town: Wire) ->
     sim.start()
     try:
         done = verb(town, "topic", "pub", "Deaf/cmd_vel", AHEAD, "--once")
-        assert (done.returncode, "not obeyed: the sim has not received it" in done.stderr) == (1, True)
+        assert (done.returncode, "not obeyed: the sim has not received it" in done.stderr) == (
+            1,
+            True,
+        )
         done = town.run("teleop", "Deaf", "--script", "-", given="3s i\n")
-        assert (done.returncode, "the sim has received none of the commands" in done.stderr) == (1, True)
+        assert (done.returncode, "the sim has received none of the commands" in done.stderr) == (
+            1,
+            True,
+        )
     finally:
         end.set()
         sim.join()

@@ -25,7 +25,11 @@ LASTING = {
 def commands(section: str) -> list[str]:
     """The holozen commands in the code blocks of a section."""
     text = (REPO / "README.md").read_text().partition(f"## {section}\n")[2].partition("\n## ")[0]
-    lines = [line for block in re.findall(r"^```\n(.*?)^```", text, re.M | re.S) for line in block.splitlines()]
+    lines = [
+        line
+        for block in re.findall(r"^```\n(.*?)^```", text, re.M | re.S)
+        for line in block.splitlines()
+    ]
     found = [line.partition(" #")[0].strip() for line in lines if line.startswith("holozen ")]
     assert found, section
     return found
@@ -33,10 +37,9 @@ def commands(section: str) -> list[str]:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wire: Wire) -> Iterator[Path]:
-    """The working folder: a checkout with a robot's file in it. Processes meet on the wire of the test."""
+    """The working folder: a checkout. Processes meet on the wire of the test."""
     for name in ("examples", "urdf", "meshes", "worlds"):
         (tmp_path / name).symlink_to(REPO / name)
-    (tmp_path / "my_bot.urdf.xacro").write_text((REPO / "urdf" / "hb_bot.urdf.xacro").read_text())
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("HOLOZEN_CONNECT", wire.endpoint)
     monkeypatch.setenv("HOLOZEN_LISTEN", wire.endpoint)

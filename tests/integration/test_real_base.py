@@ -1,4 +1,6 @@
-"""LeKiwi's base of the examples on a simulated port: it keeps what bases promise; its wheels stop, whatever ends it."""
+"""LeKiwi's base of the examples on a simulated port: it keeps what bases promise; its wheels stop,
+whatever ends it.
+"""
 
 import contextlib
 import math
@@ -20,18 +22,32 @@ import pytest
 
 from holozen.bus import Bus, BusError
 from holozen.command.base import Base
-from holozen.limits import STOP
-from holozen.messages import CommandStatus, Odometry, TriggerReply, TriggerRequest, Twist
+from holozen.command.collision_monitor import TIME_BEFORE_COLLISION, CollisionMonitor
+from holozen.limits import STOP, Planar
+from holozen.messages import (
+    CommandStatus,
+    Header,
+    LaserScan,
+    Odometry,
+    Time,
+    TriggerReply,
+    TriggerRequest,
+    Twist,
+)
+from holozen.robot.model import Pose
 from holozen.testing import Process, Terminal, Wire, wait_for
 from holozen.testing.conformance import PROMISES, Probe, name
 from holozen.transport.graph import on_key
 from holozen.wire import COMMAND_SILENCE, MAX_COMMAND_BYTES
+from tests.faults import attacks
 
 REPO = Path(__file__).parents[2]
 PAGE = REPO / "docs" / "real-robots.md"
 FOLDER = REPO / "examples" / "lekiwi"
+FAULTS = REPO / "tests" / "faults"
 STANDS = "7:0 8:0 9:0"
-SHELL = ["env", "--default-signal", "bash", "--norc", "-i"]  # SIGQUIT is ignored below a shell's background job
+# SIGQUIT is ignored below a shell's background job
+SHELL = ["env", "--default-signal", "bash", "--norc", "-i"]
 
 
 LOSSY = """
@@ -50,13 +66,20 @@ def packets(data):
 simulated_servos.packets = packets
 simulated_servos.main()
 """
-"""Servos that lose the packet that would stop them, but not the next: two processes may send at the same time."""
+"""Servos that lose the packet that would stop them, but not the next: two processes may send at the
+same time.
+"""
 
 
 class Kiwi:
     """The base, its servos, and a wire."""
 
-    def __init__(self, wire: Wire, state: Path, servos: Sequence[str] = (str(FOLDER / "simulated_servos.py"),)) -> None:
+    def __init__(
+        self,
+        wire: Wire,
+        state: Path,
+        servos: Sequence[str] = (str(FOLDER / "simulated_servos.py"),),
+    ) -> None:
         self.wire = wire
         self.flags = [*wire.flags, "--state", str(state)]
         self.servos = Process([sys.executable, *servos], env={"PYTHONPATH": str(FOLDER)})
@@ -102,7 +125,8 @@ class Kiwi:
 
 def said(base: Process) -> list[str]:
     """The lines of its errors, without those on commands that a busy machine has delivered late."""
-    return [line for line in base.err.splitlines() if not re.match(r"cmd_vel: from \S+: late: ", line)]
+    late = re.compile(r"cmd_vel: from \S+: (late|old|no echo|gone): ")
+    return [line for line in base.err.splitlines() if not late.match(line)]
 
 
 @pytest.fixture(scope="module")
@@ -131,11 +155,14 @@ def test_it_keeps_every_promise(promise: Callable[[Probe], None], probe: Probe) 
     promise(probe)
 
 
-def test_its_wheels_turn_as_those_of_an_omni_base_and_its_odometry_says_so(kiwi: Kiwi, probe: Probe) -> None:
+def test_its_wheels_turn_as_those_of_an_omni_base_and_its_odometry_says_so(
+    kiwi: Kiwi, probe: Probe
+) -> None:
     odom = kiwi.wire.bus("reader").latest("odom", Odometry)
     commands = kiwi.wire.bus("driver").publisher("cmd_vel", Twist)
     for velocity, speeds in (
-        # m/s over 0.05 m, in steps/s: the left and the right wheel roll at 30 degrees from forward, the back one aside
+        # m/s over 0.05 m, in steps/s: the left and the right wheel roll at 30 degrees from forward,
+        # the back one aside
         ((0.1, 0.0, 0.0), "7:-1129 8:0 9:1129"),
         ((0.0, 0.1, 0.0), "7:652 8:-1304 9:652"),
         ((0.0, 0.0, 0.5), "7:815 8:815 9:815"),
@@ -166,7 +193,9 @@ def test_its_wheels_stop_whatever_ends_or_holds_it(number: signal.Signals, own: 
     own.servos.signal(0)  # which still run
 
 
-def test_its_wheels_stop_when_it_is_killed_and_the_first_stop_gets_lost(wire: Wire, tmp_path: Path) -> None:
+def test_its_wheels_stop_when_it_is_killed_and_the_first_stop_gets_lost(
+    wire: Wire, tmp_path: Path
+) -> None:
     kiwi = Kiwi(wire, tmp_path, ["-c", LOSSY])
     try:
         kiwi.drive(wire.bus().publisher("cmd_vel", Twist))
@@ -187,26 +216,36 @@ def test_its_wheels_stop_when_its_whole_job_is_suspended_or_killed(end: str, own
 
         def is_hit() -> bool:
             with contextlib.suppress(OSError):  # one has just ended
-                states = [Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][0] for pid in own.processes()]
+                states = [
+                    Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][0]
+                    for pid in own.processes()
+                ]
                 return len(states) < 2 or "T" in states
             return True
 
         shell.type(end)
         wait_for(is_hit, what=lambda: f"the signal to arrive; the shell shows {shell.raw}")
-        wait_for(lambda: own.speeds() == STANDS, what=lambda: f"the wheels to stop; the shell shows {shell.raw}")
+        wait_for(
+            lambda: own.speeds() == STANDS,
+            what=lambda: f"the wheels to stop; the shell shows {shell.raw}",
+        )
         shell.type("kill -9 %1\r")
         wait_for(lambda: not own.processes(), what=lambda: f"{own.processes()} to end")
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-def test_it_ends_in_one_line_without_its_guard_which_no_other_signal_ends(number: signal.Signals, own: Kiwi) -> None:
+def test_it_ends_in_one_line_without_its_guard_which_no_other_signal_ends(
+    number: signal.Signals, own: Kiwi
+) -> None:
     own.drive(own.wire.bus().publisher("cmd_vel", Twist))
     (guard,) = set(own.processes()) - {own.base.pid}
     for other in (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         os.kill(guard, other)
     if number == signal.SIGKILL:
         own.base.kill()
-        wait_for(lambda: own.speeds() == STANDS, what="the wheels to stop by the guard that lives on")
+        wait_for(
+            lambda: own.speeds() == STANDS, what="the wheels to stop by the guard that lives on"
+        )
         wait_for(lambda: not own.processes(), what="the guard to end")
         own.kill_and_start()
         own.drive(own.wire.bus("again").publisher("cmd_vel", Twist))
@@ -214,7 +253,8 @@ def test_it_ends_in_one_line_without_its_guard_which_no_other_signal_ends(number
     os.kill(guard, number)
     assert own.base.wait() == 1
     assert said(own.base)[1:] == [
-        f"lekiwi: the guard that stops the wheels, process {guard}, has ended or hangs; start lekiwi.py again"
+        f"lekiwi: the guard that stops the wheels, process {guard}, has ended or hangs; start "
+        "lekiwi.py again"
     ]
     wait_for(lambda: own.speeds() == STANDS, what="the wheels to stop")
     if number == signal.SIGSTOP:
@@ -222,7 +262,38 @@ def test_it_ends_in_one_line_without_its_guard_which_no_other_signal_ends(number
         wait_for(lambda: not own.processes(), what="the guard to end once it goes on")
 
 
-def test_a_base_that_was_stopped_and_killed_is_still_stopped_when_it_is_started_again(own: Kiwi) -> None:
+@pytest.mark.parametrize("kind", ["patterns", "deep"])
+def test_whatever_another_peer_sends_a_stop_reaches_the_wheels(
+    kind: str, own: Kiwi, trials: Callable[[int, int], int]
+) -> None:
+    """While keys that never match hold up its session, the base stops them itself; thousands of
+    chunks end nothing.
+    """
+    driver, place = str(FAULTS / "driver.py"), own.wire.endpoint.partition("/")[2]
+    for _ in range(trials(1, 5)):
+        # A driver that went on during the stop would have to let go before it drives again.
+        with Process([sys.executable, driver, own.wire.endpoint]):
+            wait_for(
+                lambda: own.speeds() != STANDS,
+                what=lambda: f"the wheels to turn; the base wrote {own.base.err}",
+            )
+            with Process(attacks.words(kind, place)) as attacker:
+                attacker.wait_for_line("sent")
+                if kind == "patterns":
+                    own.base.wait_for_line("its own session has not answered for")
+                    wait_for(lambda: own.speeds() == STANDS, what="the wheels to stop themselves")
+                stop = own.wire.run("stop", "lekiwi", within=60)
+                wait_for(lambda: own.speeds() == STANDS, what="the wheels to stop")
+                assert stop.returncode == 0, stop
+                assert stop.stdout.splitlines()[:1] == ["lekiwi is stopped"]
+                assert own.base.returncode is None
+        own.kill_and_start()
+        assert own.wire.run("release").returncode == 0
+
+
+def test_a_base_that_was_stopped_and_killed_is_still_stopped_when_it_is_started_again(
+    own: Kiwi,
+) -> None:
     bus = own.wire.bus("person")
     assert bus.call("stop", TriggerRequest(), TriggerReply, timeout=20).success
     own.kill_and_start()
@@ -235,7 +306,11 @@ def test_a_base_that_was_stopped_and_killed_is_still_stopped_when_it_is_started_
     def is_refused() -> bool:
         commands.put(Twist.planar(0.1))
         status, _ = statuses.read()
-        return status is not None and status.stopped.startswith("person@") and status.refused.get("stopped", 0) > 0
+        return (
+            status is not None
+            and status.stopped.startswith("person@")
+            and status.refused.get("stopped", 0) > 0
+        )
 
     wait_for(is_refused)
     assert own.speeds() == STANDS
@@ -253,7 +328,9 @@ def test_a_second_base_of_the_same_name_is_refused_and_the_first_is_named(own: K
             assert second.wait() == 1
             (line,) = second.err.splitlines()
             assert re.fullmatch(
-                r"lekiwi: the robot is served by lekiwi@\w+ already: end that one, or give this one another name", line
+                r"lekiwi: the robot is served by lekiwi@\w+ already: end that one, or give this "
+                r"one another name",
+                line,
             )
         with Process([*start, "Kiwi", *own.flags]) as other:
             other.wait_for_line("drives the servos")
@@ -264,7 +341,9 @@ def test_of_two_bases_that_did_not_discover_each_other_in_time_one_ends(
     wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("HOLOZEN_STATE", str(tmp_path))
-    low, high = sorted((wire.bus("one", lasting=True), wire.bus("two", lasting=True)), key=lambda bus: bus.id)
+    low, high = sorted(
+        (wire.bus("one", lasting=True), wire.bus("two", lasting=True)), key=lambda bus: bus.id
+    )
 
     def meet(mine: Bus, other: Bus, robot: str) -> Base:
         """A base on one bus, whose robot the other one serves after that."""
@@ -286,7 +365,8 @@ def test_what_was_fresh_before_a_suspension_moves_no_base_after_it(
     commands: Any = wire.bus("driver").publisher("cmd_vel", Twist)
     wait_for(lambda: commands.put(Twist.planar(0.1)) or base.velocity() != STOP)
     suspended = SimpleNamespace(monotonic=count(time.monotonic(), 1.0).__next__, time=time.time)
-    monkeypatch.setattr("holozen.command.base.time", suspended)  # for a second between any two looks at the clock
+    # for a second between any two looks at the clock
+    monkeypatch.setattr("holozen.command.base.time", suspended)
     commands.put(Twist.planar(0.1))
     assert base.velocity() == STOP
 
@@ -314,7 +394,9 @@ def test_what_is_no_limit_and_no_name_is_refused(wire: Wire, tmp_path: Path) -> 
         return status is not None and status.refused.get("oversized", 0) > 0
 
     wait_for(is_refused)
-    wait_for(lambda: commands.put(Twist.planar(0.4, turn=-1.0)) or base.velocity() == (0.3, 0.0, -0.5))
+    wait_for(
+        lambda: commands.put(Twist.planar(0.4, turn=-1.0)) or base.velocity() == (0.3, 0.0, -0.5)
+    )
 
 
 def test_it_stands_when_its_driver_is_gone_or_silent(
@@ -325,7 +407,9 @@ def test_it_stands_when_its_driver_is_gone_or_silent(
     commands: Any = driver.publisher("cmd_vel", Twist)
     wait_for(lambda: commands.put(Twist.planar(0.1)) or base.velocity() != STOP)
     now = time.monotonic() + COMMAND_SILENCE + 0.01
-    monkeypatch.setattr("holozen.command.base.time", SimpleNamespace(monotonic=lambda: now, time=time.time))
+    monkeypatch.setattr(
+        "holozen.command.base.time", SimpleNamespace(monotonic=lambda: now, time=time.time)
+    )
     assert base.velocity() == STOP, "the watchdog"
 
     def moves() -> bool:
@@ -343,8 +427,13 @@ def test_its_pose_is_where_the_velocities_that_it_measured_have_brought_it(
     wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = time.monotonic()
-    monkeypatch.setattr("holozen.command.base.time", SimpleNamespace(monotonic=lambda: now, time=time.time))
-    base, odom = Base(wire.bus("base", lasting=True), state=tmp_path), wire.bus("reader").latest("odom", Odometry)
+    monkeypatch.setattr(
+        "holozen.command.base.time", SimpleNamespace(monotonic=lambda: now, time=time.time)
+    )
+    base, odom = (
+        Base(wire.bus("base", lasting=True), state=tmp_path),
+        wire.bus("reader").latest("odom", Odometry),
+    )
     for velocity in ((0.2, 0.0, 0.0), (0.0, 0.0, math.pi), (0.2, 0.4, 0.0)):
         now += 0.5
         base.publish(velocity)
@@ -352,7 +441,9 @@ def test_its_pose_is_where_the_velocities_that_it_measured_have_brought_it(
     def is_there() -> bool:
         base.publish(STOP)
         newest, _ = odom.read()
-        return newest is not None and newest.pose.pose.planar() == pytest.approx((-0.1, 0.1, math.pi / 2))
+        return newest is not None and newest.pose.pose.planar() == pytest.approx(
+            (-0.1, 0.1, math.pi / 2)
+        )
 
     wait_for(is_there)
 
@@ -388,11 +479,17 @@ my_wheels = Wheels()
 def test_the_documented_program_stops_its_wheels_whatever_ends_it(
     fault: str, reason: str, wire: Wire, tmp_path: Path
 ) -> None:
-    (program,) = re.findall(r"^```python\n(import sys\n.*?my_wheels.*?)^```$", PAGE.read_text(), re.M | re.S)
+    (program,) = re.findall(
+        r"^```python\n(import sys\n.*?my_wheels.*?)^```$", PAGE.read_text(), re.M | re.S
+    )
     here = f"Connection(connect=({wire.endpoint!r},), listen=({wire.endpoint!r},))"
     assert "Connection()" in program
-    (tmp_path / "my_base.py").write_text(WHEELS.format(fault=fault) + program.replace("Connection()", here))
-    with Process([sys.executable, str(tmp_path / "my_base.py")], env={"HOLOZEN_STATE": str(tmp_path)}) as base:
+    (tmp_path / "my_base.py").write_text(
+        WHEELS.format(fault=fault) + program.replace("Connection()", here)
+    )
+    with Process(
+        [sys.executable, str(tmp_path / "my_base.py")], env={"HOLOZEN_STATE": str(tmp_path)}
+    ) as base:
         commands = wire.bus("driver").publisher("cmd_vel", Twist)
 
         def has_ended() -> bool:
@@ -425,7 +522,9 @@ def test_a_port_without_servos_is_reported_in_one_line(wire: Wire) -> None:
         os.close(there)
 
 
-def test_a_port_that_hangs_up_while_a_servo_is_asked_ends_that(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_port_that_hangs_up_while_a_servo_is_asked_ends_that(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.syspath_prepend(FOLDER)
     feetech = import_module("feetech")
     here, there = os.openpty()
@@ -457,3 +556,46 @@ def test_a_servo_whose_answer_is_late_is_asked_again(monkeypatch: pytest.MonkeyP
         thread.join()
     os.close(here)
     os.close(there)
+
+
+def test_it_slows_down_for_what_its_scanner_sees_and_stands_while_that_is_silent(
+    wire: Wire, tmp_path: Path
+) -> None:
+    monitor = CollisionMonitor(0.2, {"front/scan": Pose((0.1, 0.0, 0.0))})
+    base = Base(wire.bus("base", lasting=True), "Fred", state=tmp_path, monitor=monitor)
+    driver = wire.bus("driver")
+    commands: Any = driver.publisher("Fred/cmd_vel", Twist)
+    scanner: Any = driver.publisher("Fred/front/scan", LaserScan)
+    statuses = driver.latest("Fred/cmd_vel_status", CommandStatus)
+
+    def drives(velocity: Twist, limited: str, *ranges: float, age: float = 0.0) -> Planar:
+        """What is driven once the status says so, in a regular expression."""
+        driven = STOP
+
+        def said() -> bool:
+            nonlocal driven
+            commands.put(velocity)
+            if ranges:
+                header = Header(Time.of(time.time() - age))
+                scanner.put(LaserScan(header, range_max=5.0, ranges=list(ranges)))
+            driven = base.velocity()
+            status, _ = statuses.read()
+            says = bool(status and re.fullmatch(limited, status.limited))
+            return says and status is not None and status.obeyed == driver.source
+
+        wait_for(said, what=limited)
+        status, _ = statuses.read()
+        assert status is not None and status.time_before_collision == TIME_BEFORE_COLLISION
+        return driven
+
+    ahead, back = Twist.planar(0.5), Twist.planar(-0.5)
+    assert drives(ahead, "stopped: no scan has come yet") == STOP
+    assert drives(ahead, "", 3.0) == (0.5, 0.0, 0.0)
+    x, *_ = drives(ahead, "slowed: 0.3 m ahead", 0.4)
+    assert x == pytest.approx(0.2 / TIME_BEFORE_COLLISION, abs=0.05)
+    assert drives(ahead, "stopped: 0.1 m ahead", 0.2) == STOP
+    assert drives(back, "", 0.2) == (-0.5, 0.0, 0.0)
+    assert drives(back, "stopped: the scan is blind: none of its ranges is valid", math.nan) == STOP
+    assert drives(ahead, r"stopped: the scan is 9\.\d s old", 3.0, age=9.0) == STOP
+    assert drives(ahead, "", 3.0) == (0.5, 0.0, 0.0)
+    assert drives(ahead, r"stopped: the scan is [\d.]+ s old") == STOP, "silent"

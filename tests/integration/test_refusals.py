@@ -10,20 +10,21 @@ import msgspec
 import pytest
 import zenoh
 
-from holozen.messages import Header, Odometry, Time, Twist, TwistStamped, Vector3
+from holozen.messages import Header, Odometry, Time, Twist, TwistStamped
 from holozen.messages.codec import WIRES
 from holozen.testing import Wire, wait_for
 
 from .conftest import start_sim
 from .robots import Robot, distance, moves, place, rests, time_of
 
-JSON, MSGPACK = WIRES["json"], WIRES["msgpack"]
+JSON = WIRES["json"]
+CDR = f"{WIRES['cdr']};geometry_msgs/msg/Twist"
 REPORT = "cmd_vel: from "
 
 
 def packed(x: float) -> bytes:
-    """A Twist in msgpack, which has a NaN and an infinity."""
-    return msgspec.msgpack.encode(Twist(Vector3(x=x)))
+    """A Twist in CDR, which has a NaN and an infinity."""
+    return b"\0\1\0\0" + struct.pack("<6d", x, 0, 0, 0, 0, 0)
 
 
 def stamped(seconds: float) -> bytes:
@@ -31,12 +32,19 @@ def stamped(seconds: float) -> bytes:
 
 
 BAD = {
-    "NaN in msgpack": ("not finite", packed(math.nan), MSGPACK),
-    "infinity in msgpack": ("not finite", packed(math.inf), MSGPACK),
-    "minus infinity in msgpack": ("not finite", packed(-math.inf), MSGPACK),
-    "NaN in the unused angular.x": ("not finite", msgspec.msgpack.encode(Twist(angular=Vector3(x=math.nan))), MSGPACK),
+    "NaN in CDR": ("not finite", packed(math.nan), CDR),
+    "infinity in CDR": ("not finite", packed(math.inf), CDR),
+    "minus infinity in CDR": ("not finite", packed(-math.inf), CDR),
+    "NaN in the unused angular.x": (
+        "not finite",
+        b"\0\1\0\0" + struct.pack("<6d", 0, 0, 0, math.nan, 0, 0),
+        CDR,
+    ),
     "NaN in a stamped one": (
-        "not finite", msgspec.msgpack.encode(TwistStamped(twist=Twist(Vector3(y=math.nan)))), MSGPACK),
+        "not finite",
+        b"\0\1\0\0" + struct.pack("<iII4x6d", 0, 0, 1, 0, math.nan, 0, 0, 0, 0),
+        f"{WIRES['cdr']};geometry_msgs/msg/TwistStamped",
+    ),
     "NaN in JSON": ("malformed", b'{"linear":{"x":NaN}}', JSON),
     "a number too large for JSON": ("malformed", b'{"linear":{"x":1e999}}', JSON),
     "a null": ("malformed", b'{"linear":{"x":null}}', JSON),
@@ -50,18 +58,29 @@ BAD = {
     "no UTF-8": ("malformed", b'{"linear":{"\xff":1}}', JSON),
     "bytes": ("malformed", bytes(range(256)), "zenoh/bytes"),
     "deep nesting": ("malformed", b"[" * 60_000, JSON),
-    "msgpack called JSON": ("malformed", packed(1.0), JSON),
-    "JSON called msgpack": ("malformed", b'{"linear":{"x":1}}', MSGPACK),
+    "JSON called CDR": ("malformed", b'{"linear":{"x":1}}', CDR),
     "an unknown encoding": ("malformed", b'{"linear":{"x":1}}', "image/png"),
-    "CDR that is cut off": ("malformed", b"\0\1\0\0" + struct.pack("<5d", 1, 0, 0, 0, 0), "application/cdr"),
-    "CDR of no stated type": ("malformed", b"\0\1\0\0" + struct.pack("<6d", 1, 0, 0, 0, 0, 0), "zenoh/bytes"),
-    "CDR that says it is JSON": ("malformed", b"\0\1\0\0" + struct.pack("<6d", 1, 0, 0, 0, 0, 0), "application/json"),
+    "CDR that is cut off": (
+        "malformed",
+        b"\0\1\0\0" + struct.pack("<5d", 1, 0, 0, 0, 0),
+        "application/cdr",
+    ),
+    "CDR of no stated type": (
+        "malformed",
+        b"\0\1\0\0" + struct.pack("<6d", 1, 0, 0, 0, 0, 0),
+        "zenoh/bytes",
+    ),
+    "CDR that says it is JSON": (
+        "malformed",
+        b"\0\1\0\0" + struct.pack("<6d", 1, 0, 0, 0, 0, 0),
+        "application/json",
+    ),
     "10 MB": ("oversized", b'{"linear":{"x":1}}' + b" " * 10_000_000, JSON),
     "just over the limit": ("oversized", b'{"linear":{"x":1}}'.ljust(65_537), JSON),
     "a stamp of yesterday": ("stale", stamped(time.time() - 86_400), JSON),
     "a stamp of tomorrow": ("stale", stamped(time.time() + 86_400), JSON),
     "a stamp before the epoch": ("stale", stamped(-5.0), JSON),
-}  # fmt: skip
+}
 
 
 @pytest.fixture
@@ -74,7 +93,9 @@ def standing(robot: Robot) -> Iterator[Robot]:
     assert all(map(math.isfinite, place(after)))
 
 
-def test_it_is_refused_and_counted_and_the_robot_stands(standing: Robot, foreign: zenoh.Session) -> None:
+def test_it_is_refused_and_counted_and_the_robot_stands(
+    standing: Robot, foreign: zenoh.Session
+) -> None:
     for name in BAD:
         is_refused(standing, foreign, name)
 
@@ -82,7 +103,9 @@ def test_it_is_refused_and_counted_and_the_robot_stands(standing: Robot, foreign
 def is_refused(standing: Robot, foreign: zenoh.Session, name: str) -> None:
     kind, payload, encoding = BAD[name]
     before = standing.status().refused.get(kind, 0)
-    foreign.put("cmd_vel", payload, encoding=encoding, congestion_control=zenoh.CongestionControl.BLOCK)
+    foreign.put(
+        "cmd_vel", payload, encoding=encoding, congestion_control=zenoh.CongestionControl.BLOCK
+    )
     status = standing.status_when(lambda status: status.refused.get(kind, 0) > before)
     assert status.refused[kind] == before + 1, name
     assert status.obeyed == "", name
@@ -95,15 +118,16 @@ def test_a_delete_is_no_command(standing: Robot, foreign: zenoh.Session) -> None
     standing.status_when(lambda status: status.refused.get("malformed", 0) == before + 1)
 
 
-@pytest.mark.parametrize("key", ["*", "**", "cmd_ve$*"])
-def test_a_command_for_every_robot_is_one_for_none(standing: Robot, foreign: zenoh.Session, key: str) -> None:
+def test_a_command_for_every_robot_is_one_for_none(standing: Robot, foreign: zenoh.Session) -> None:
     before = standing.status().refused.get("wildcard", 0)
-    foreign.put(key, b'{"linear":{"x":1}}')
+    foreign.put("cmd_ve$*", b'{"linear":{"x":1}}')
     status = standing.status_when(lambda status: status.refused.get("wildcard", 0) > before)
     assert "name one robot" in status.last_refusal
 
 
-def test_a_driven_robot_drives_on_through_a_flood_of_bad_commands(robot: Robot, foreign: zenoh.Session) -> None:
+def test_a_driven_robot_drives_on_through_a_flood_of_bad_commands(
+    robot: Robot, foreign: zenoh.Session
+) -> None:
     part = robot.odom.from_now()
     robot.drive(0.3)
     for kind, payload, encoding in list(BAD.values()) * 5:
@@ -142,38 +166,31 @@ def test_a_person_reads_the_sender_and_the_problem(wire: Wire) -> None:
 
 def test_a_source_cannot_write_on_the_terminal_through_its_name(wire: Wire) -> None:
     sim = start_sim(wire)
-    Robot(wire.bus()).bus.session.put("cmd_vel", b'{"\\u001b[31m\\n":1}', attachment=b"\x1b[2Jme\nsim: all is well")
+    Robot(wire.bus()).bus.session.put(
+        "cmd_vel", b'{"\\u001b[31m\\n":1}', attachment=b"\x1b[2Jme\nsim: all is well"
+    )
     sim.wait_for_line(REPORT)
     assert "\x1b" not in sim.err
     assert "\nsim: all is well" not in sim.err
 
 
-@pytest.mark.parametrize(
-    ("asked", "driven"),
-    [
-        ((100.0, 0, 0), (5, 0, 0)),
-        ((0, -100.0, 0), (0, -5, 0)),
-        ((30.0, 40.0, 0), (3, 4, 0)),
-        ((0, 0, 99.0), (0, 0, 10)),
-    ],
-)
-def test_over_the_limit_is_clamped_in_the_same_direction_and_reported(
-    robot: Robot, asked: tuple[float, float, float], driven: tuple[float, float, float]
-) -> None:
-    before, reason = robot.status().refused.get("clamped", 0), "over the limits of 5 m/s and 10 rad/s, clamped"
+def test_over_the_limit_is_clamped_in_the_same_direction_and_reported(robot: Robot) -> None:
+    before, reason = (
+        robot.status().refused.get("clamped", 0),
+        "over the limits of 5 m/s and 10 rad/s, clamped",
+    )
 
     def clamped(odom: Odometry) -> bool:
         status = robot.last_status()
         counted = status.refused.get("clamped", 0) > before and reason in status.last_refusal
-        return counted and moves(odom, *driven, tolerance=0.01)
+        return counted and moves(odom, 3, 4, 0, tolerance=0.01)
 
-    robot.drive(*asked, until=clamped)
+    robot.drive(30.0, 40.0, until=clamped)
     robot.stop()
 
 
-@pytest.mark.parametrize("huge", [1.7e308, -1.7e308])
-def test_numbers_at_the_end_of_the_scale_leave_a_robot_with_a_place(robot: Robot, huge: float) -> None:
-    robot.put(huge, huge, huge)
+def test_numbers_at_the_end_of_the_scale_leave_a_robot_with_a_place(robot: Robot) -> None:
+    robot.put(1.7e308, -1.7e308, 1.7e308)
     robot.pass_time(0.1)
     stood = robot.stop()
     assert all(map(math.isfinite, place(stood)))
@@ -187,7 +204,9 @@ def test_clamping_is_reported_on_stderr_with_the_limits_of_the_flags(wire: Wire)
     sim.wait_for_line("over the limits of 0.2 m/s and 0.4 rad/s, clamped: (1.0, 0.0, 1.0)")
 
 
-def test_a_fresh_stamp_of_either_clock_and_no_stamp_are_obeyed(robot: Robot, foreign: zenoh.Session) -> None:
+def test_a_fresh_stamp_of_either_clock_and_no_stamp_are_obeyed(
+    robot: Robot, foreign: zenoh.Session
+) -> None:
     """Sim time and wall time, as senders have the one or the other; a zero stamp means none."""
     for stamp in (time.time, lambda: time_of(robot.newest()), lambda: 0.0):
 

@@ -1,7 +1,8 @@
-"""Every robot of urdf/: checked, driven 2 m and turned in lock-step, and compared with the closed form.
+"""Every robot of urdf/: checked, driven 2 m and turned in lock-step, and compared with the closed
+form.
 
-What docs/robots.md states is what stands here. Wheels are turned by motors and the ground does the rest, so they have
-bounds of their own.
+The evidence in docs/ states what stands here. Wheels are turned by motors and the ground does the
+rest, so they have bounds of their own.
 """
 
 import math
@@ -15,7 +16,7 @@ import pytest
 from holozen import entities
 from holozen.cli import main
 from holozen.messages import JointState, Odometry, Twist
-from holozen.robot.loading import load
+from holozen.robot.files.loading import load
 from holozen.robot.model import RobotModel
 from holozen.robot.rigid import joint_axes, lowest
 from holozen.testing import LockStep, Wire, wait_for
@@ -31,10 +32,11 @@ FILES = sorted(path.name for path in URDF.glob("*.xacro") if path.name not in NO
 class Stated:
     """What is stated of a robot. Metres, radians, seconds of sim time.
 
-    `way` and `yaw` are how far it is from the closed form after 2 m, and `turn` the part of a commanded turn that it
-    makes, at least and at most. `spot` is how far it strays while it turns on the spot. `settling` is the time that it
-    takes to come to a speed, `stopping` the way that it takes to stop from 0.5 m/s. `odom` is how far odometry is from
-    the truth after all that, in metres and in radians, and `speed` how far its velocity is from the commanded one.
+    `way` and `yaw` are how far it is from the closed form after 2 m, and `turn` the part of a
+    commanded turn that it makes, at least and at most. `spot` is how far it strays while it turns
+    on the spot. `settling` is the time that it takes to come to a speed, `stopping` the way that it
+    takes to stop from 0.5 m/s. `odom` is how far odometry is from the truth after all that, in
+    metres and in radians, and `speed` how far its velocity is from the commanded one.
     """
 
     way: float = 1e-3
@@ -53,7 +55,14 @@ STATED = {
     "explorer.urdf.xacro": Stated(sideways=True),
     "mecanum.urdf.xacro": Stated(sideways=True),
     "omni.urdf.xacro": Stated(
-        way=0.01, yaw=0.01, turn=(0.99, 1.01), spot=5e-3, settling=0.5, stopping=0.03, speed=0.02, sideways=True
+        way=0.01,
+        yaw=0.01,
+        turn=(0.99, 1.01),
+        spot=5e-3,
+        settling=0.5,
+        stopping=0.03,
+        speed=0.02,
+        sideways=True,
     ),
     "mecanum_rollers.urdf.xacro": Stated(
         way=0.02,
@@ -67,7 +76,14 @@ STATED = {
         sideways=True,
     ),
     "differential.urdf.xacro": Stated(
-        way=5e-3, yaw=0.015, turn=(0.99, 1.01), spot=0.04, settling=0.5, stopping=0.06, odom=(0.1, 0.05), speed=5e-3
+        way=5e-3,
+        yaw=0.015,
+        turn=(0.99, 1.01),
+        spot=0.04,
+        settling=0.5,
+        stopping=0.06,
+        odom=(0.1, 0.05),
+        speed=5e-3,
     ),
     "rover.urdf.xacro": Stated(
         way=5e-3, yaw=0.015, turn=(0.85, 1.01), spot=0.03, settling=0.5, stopping=0.03, speed=5e-3
@@ -97,7 +113,9 @@ class Forward:
 
 @dataclass(frozen=True)
 class Round:
-    """Some drives and silence, from where it stood to where it stands: by odometry, and in the world."""
+    """Some drives and silence, from where it stood to where it stands: by odometry, and in the
+    world.
+    """
 
     odom: tuple[Planar, Planar]
     truth: tuple[Planar, Planar]
@@ -124,7 +142,9 @@ class Driven:
         return odoms
 
     def steady(self, velocity: Planar, seconds: float) -> list[Odometry]:
-        """Odoms over so much time at a velocity, after the time that the robot takes to come to it."""
+        """Odoms over so much time at a velocity, after the time that the robot takes to come to
+        it.
+        """
         start = self.drive(velocity, self.stated.settling)[-1]
         return [start, *self.drive(velocity, seconds)]
 
@@ -259,9 +279,14 @@ def test_its_wheels_turn_forward_when_it_drives_forward(driven: Driven) -> None:
 
 
 def forward_rates(model: RobotModel, speed: float) -> dict[str, float]:
-    """Of the wheels, not of what rolls on them: an axle to the left turns by +v/r, one to the right by -v/r."""
+    """Of the wheels, not of what rolls on them: an axle to the left turns by +v/r, one to the right
+    by -v/r.
+    """
     wheels = {name: axis for name, axis in joint_axes(model).items() if "roller" not in name}
-    return {name: speed * axis.direction[1] / (axis.xyz[2] - lowest(model)) for name, axis in wheels.items()}
+    return {
+        name: speed * axis.direction[1] / (axis.xyz[2] - lowest(model))
+        for name, axis in wheels.items()
+    }
 
 
 def test_its_odometry_is_where_it_is(driven: Driven) -> None:

@@ -36,7 +36,9 @@ def test_each_robot_is_in_one_shard_and_all_are_one_world_to_callers(
     town: Wire, shards: tuple[Process, Process], verb: Verb
 ) -> None:
     listed = verb(town, "list")
-    assert [line.split()[0] for line in listed.stdout.splitlines()] == [f"bot{number}" for number in range(6)]
+    assert [line.split()[0] for line in listed.stdout.splitlines()] == [
+        f"bot{number}" for number in range(6)
+    ]
     assert listed.stderr == "they are in 2 sims; robots of different sims do not collide\n"
     first, second = shards
     for name, here, there in ((OF_FIRST, first, second), (OF_SECOND, second, first)):
@@ -53,7 +55,9 @@ def test_robots_of_all_shards_drive_and_are_stopped_paused_and_reset(
     robots = [Robot(town.bus(), name) for name in (OF_FIRST, OF_SECOND)]
     for robot in robots:
         robot.drive(0.3)
-    assert sorted(verb(town, "stop").stdout.splitlines()) == [f"bot{number} is stopped" for number in range(6)]
+    assert sorted(verb(town, "stop").stdout.splitlines()) == [
+        f"bot{number} is stopped" for number in range(6)
+    ]
     for robot in robots:
         robot.stands()
     assert verb(town, "release").returncode == 0
@@ -69,35 +73,58 @@ def test_robots_of_all_shards_drive_and_are_stopped_paused_and_reset(
 
 REFUSED = {
     "a number that runs": ("1/2", 1, "sim: shard 1/2 runs already; take another: --shard auto/2"),
-    "another count": ("1/3", 1, "sim: shard 1/2 runs here: all shards have the same N; use --shard auto/2"),
-    "none is free": ("auto/2", 1, "sim: all 2 shards run already; end them all before you start more of them"),
-    "beyond the count": ("3/2", 2, "holozen sim: argument --shard: '3/2': give K/N with K from 1 to N and N up to 64"),
-    "no number": ("x", 2, "holozen sim: argument --shard: 'x' is no shard; give K/N, such as 1/3, or auto/3"),
+    "another count": (
+        "1/3",
+        1,
+        "sim: shard 1/2 runs here: all shards have the same N; use --shard auto/2",
+    ),
+    "none is free": (
+        "auto/2",
+        1,
+        "sim: all 2 shards run already; end them all before you start more of them",
+    ),
+    "beyond the count": (
+        "3/2",
+        2,
+        "holozen sim: argument --shard: '3/2': give K/N with K from 1 to N and N up to 64",
+    ),
+    "no number": (
+        "x",
+        2,
+        "holozen sim: argument --shard: 'x' is no shard; give K/N, such as 1/3, or auto/3",
+    ),
 }
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_a_shard_that_cannot_be_is_refused(town: Wire, shards: tuple[Process, Process], name: str) -> None:
+def test_a_shard_that_cannot_be_is_refused(
+    town: Wire, shards: tuple[Process, Process], name: str
+) -> None:
     shard, code, reason = REFUSED[name]
     done = town.run("sim", "--shard", shard)
     assert done.returncode == code and reason in done.stderr, done.stderr
     assert all(process.returncode is None for process in shards)
 
 
-def test_a_shard_that_is_killed_takes_its_own_robots_alone_and_comes_back_without_them(wire: Wire, verb: Verb) -> None:
+def test_a_shard_that_is_killed_takes_its_own_robots_alone_and_comes_back_without_them(
+    wire: Wire, verb: Verb
+) -> None:
     up = wire.start("up", "--shards", "2")
     wait_for(lambda: up.err.count("this is shard") == 2, 30)
     for name in (OF_FIRST, OF_SECOND):
         done = verb(wire, "spawn", str(BOT), "--name", name, "-x", name[-1])
         assert done.returncode == 0, done.stderr
     os.kill(parts_at(wire)["sim"], signal.SIGKILL)
-    line = up.wait_for_line("starting it again in 0.5 s; the robots that were spawned in this shard are gone")
+    line = up.wait_for_line(
+        "starting it again in 0.5 s; the robots that were spawned in this shard are gone"
+    )
     number = re.search(r"up: sim (\d)/2 was ended by signal 9", line)
     assert number, line
     gone, left = (OF_FIRST, OF_SECOND) if number[1] == "1" else (OF_SECOND, OF_FIRST)
     Robot(wire.bus(), left).drive(0.3)
     wait_for(lambda: up.err.count("this is shard") == 3, 30)
-    # If the meeting point was that of the shard which died, the other one first has to reach the new one.
+    # If the meeting point was that of the shard which died, the other one first has to reach the
+    # new one.
     wait_for(lambda: names(wire, verb) == [left])
     done = verb(wire, "spawn", str(BOT), "--name", gone, "-x", gone[-1])
     assert done.returncode == 0, done.stderr
@@ -111,9 +138,14 @@ def test_the_name_of_a_robot_whose_shard_does_not_run_is_refused_until_a_sim_tak
     first.wait_for_line("this is shard 1/2")
     done = verb(wire, "spawn", str(BOT), "--name", OF_SECOND)
     assert_one_line(
-        done, 1, f"holozen spawn: '{OF_SECOND}' belongs to shard 2/2, which does not run; start it: holozen sim --shard"
+        done,
+        1,
+        f"holozen spawn: '{OF_SECOND}' belongs to shard 2/2, which does not run; start it: "
+        "holozen sim --shard",
     )
-    second = wire.start("sim", "--shard", "auto/2", "--robot", f"{BOT}={OF_FIRST}", "--robot", f"{BOT}={OF_SECOND}")
+    second = wire.start(
+        "sim", "--shard", "auto/2", "--robot", f"{BOT}={OF_FIRST}", "--robot", f"{BOT}={OF_SECOND}"
+    )
     second.wait_for_line("this is shard 2/2")
     assert names(wire, verb) == [OF_SECOND]
 
@@ -122,9 +154,9 @@ def test_a_health_check_knows_its_own_shard_and_a_loop_that_does_not_go(
     town: Wire, shards: tuple[Process, ...], verb: Verb
 ) -> None:
     done = verb(town, "doctor", "--health", "sim")
-    assert done.returncode == 0 and re.search(r"^ok +health: sim_1_of_2 \(.*sim_2_of_2 \(.* answers$", done.stdout), (
-        done
-    )
+    assert done.returncode == 0 and re.search(
+        r"^ok +health: sim_1_of_2 \(.*sim_2_of_2 \(.* answers$", done.stdout
+    ), done
     assert verb(town, "doctor", "--health", "controller").stdout.startswith(
         "error    health: no controller of this machine"
     )

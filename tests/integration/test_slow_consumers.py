@@ -30,12 +30,16 @@ def held_back(wire: Wire) -> int:
     """Bytes that wait in that socket of the sim in which the most do."""
     rows = [row.split() for row in Path("/proc/net/tcp").read_text().splitlines()[1:]]
     here = f"0100007F:{wire.port:04X}"
-    return max(int(waiting.partition(":")[0], 16) for _, local, _, _, waiting, *_ in rows if local == here)
+    return max(
+        int(waiting.partition(":")[0], 16) for _, local, _, _, waiting, *_ in rows if local == here
+    )
 
 
 @pytest.fixture
 def slow(wire: Wire, fast_robot: Robot) -> Iterator[Process]:
-    """A subscriber of odom, tf and joint_states that was sent more than it and the system's buffers can hold."""
+    """A subscriber of odom, tf and joint_states that was sent more than it and the system's buffers
+    can hold.
+    """
     with deaf(wire, "**") as process:
 
         def full() -> bool:
@@ -63,7 +67,7 @@ sessions = [zenoh.open(config) for _ in range(10)]
 subscribers = [session.declare_subscriber("**") for session in sessions]  # queues that block when they are full
 print("ten", flush=True)
 time.sleep(3600)
-"""
+"""  # noqa: E501
 COMMANDS = 200
 
 
@@ -76,10 +80,17 @@ def test_ten_frozen_readers_do_not_make_commands_older(wire: Wire) -> None:
     with Process([sys.executable, "-c", TEN, json.dumps([wire.endpoint])]) as ten:
         ten.wait_for_line("ten")
         ten.signal(signal.SIGSTOP)
-        wait_for(lambda: held_back(wire) > 100_000, 120, lambda: f"full windows; {held_back(wire)} bytes wait")
+        wait_for(
+            lambda: held_back(wire) > 100_000,
+            120,
+            lambda: f"full windows; {held_back(wire)} bytes wait",
+        )
         beside = ages(robot)
         assert ten.returncode is None
-    print(f"age of a command, 99th percentile: {1000 * alone:.1f} ms alone, {1000 * beside:.1f} ms beside ten readers")
+    print(
+        f"age of a command, 99th percentile: {1000 * alone:.1f} ms alone, {1000 * beside:.1f} ms "
+        "beside ten readers"
+    )
     assert beside < max(0.05, 3 * alone)
 
 
@@ -93,7 +104,12 @@ def ages(robot: Robot) -> float:
 
         def seen(part: Part = part, speed: float = speed) -> float:
             return next(
-                (sent_at(each) for each in part.all() if each.message and moves(each.message, speed, 0, 0)), 0.0
+                (
+                    sent_at(each)
+                    for each in part.all()
+                    if each.message and moves(each.message, speed, 0, 0)
+                ),
+                0.0,
             )
 
         found.append(wait_for(seen, 20, "a command to be obeyed") - sent)

@@ -1,4 +1,6 @@
-"""Robots come and go while the sim runs; the teleop and the controller drive them, and they leave no trace."""
+"""Robots come and go while the sim runs; the teleop and the controller drive them, and they leave
+no trace.
+"""
 
 import json
 import os
@@ -12,7 +14,7 @@ from holozen import entities
 from holozen.bus import Bus
 from holozen.messages import Clock
 from holozen.messages import simulation_interfaces as si
-from holozen.robot.xacro import expand_xacro
+from holozen.robot.files.xacro import expand_xacro
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.errors import ServiceError
 
@@ -48,7 +50,9 @@ def wire(town: Wire) -> Wire:
 
 def keys(bus: Bus) -> set[str]:
     """What the sim stands on."""
-    return {endpoint.key for endpoint in bus.graph().settled(bus.connected) if endpoint.node == "sim"}
+    return {
+        endpoint.key for endpoint in bus.graph().settled(bus.connected) if endpoint.node == "sim"
+    }
 
 
 def done(verb: Verb, wire: Wire, *words: str) -> str:
@@ -65,9 +69,12 @@ def refused(verb: Verb, wire: Wire, *words: str) -> str:
     return ended.stderr
 
 
-def test_a_robot_is_spawned_under_a_name_driven_listed_and_deleted(verb: Verb, wire: Wire, sim: Process) -> None:
+def test_a_robot_is_spawned_under_a_name_driven_listed_and_deleted(
+    verb: Verb, wire: Wire, sim: Process
+) -> None:
     assert (
-        done(verb, wire, "spawn", HB_BOT, "--name", "Fred", "-x", "1", "-Y", "1.5") == "Fred listens on Fred/cmd_vel\n"
+        done(verb, wire, "spawn", HB_BOT, "--name", "Fred", "-x", "1", "-Y", "1.5")
+        == "Fred listens on Fred/cmd_vel\n"
     )
     fred = Robot(wire.bus(), "Fred")
     start = fred.stands()
@@ -82,7 +89,9 @@ def test_a_robot_is_spawned_under_a_name_driven_listed_and_deleted(verb: Verb, w
     assert verb(wire, "list").stdout == ""
 
 
-def test_a_robot_without_a_height_stands_on_the_ground_and_with_one_falls(verb: Verb, wire: Wire, sim: Process) -> None:
+def test_a_robot_without_a_height_stands_on_the_ground_and_with_one_falls(
+    verb: Verb, wire: Wire, sim: Process
+) -> None:
     done(verb, wire, "spawn", HB_BOT, "--name", "low")
     done(verb, wire, "spawn", HB_BOT, "--name", "high", "-x", "5", "-z", "0.5")
     low, high = Robot(wire.bus(), "low"), Robot(wire.bus("other"), "high")
@@ -98,7 +107,9 @@ def test_the_teleop_and_the_controller_work_on_a_robot_that_came_later(
     terminal = wire.terminal("teleop", "Fred")
     terminal.wait_for_text("listening sim")
     odom = fred.odom.from_now()
-    terminal.hold_until("i", lambda: any(each.twist.twist.linear.x > 0.4 for each in odom.messages()))
+    terminal.hold_until(
+        "i", lambda: any(each.twist.twist.linear.x > 0.4 for each in odom.messages())
+    )
     fred.stands()
     terminal.type("\x03")
     assert terminal.process.wait() == 0
@@ -118,28 +129,39 @@ def test_a_repeated_name_an_unknown_robot_and_a_wrong_file_are_reported_with_the
     taken = refused(verb, wire, "spawn", HB_BOT, "--name", "Fred")
     assert "there is an entity 'Fred' already; the entities are Fred" in taken
     assert "there is no entity 'Ann'; the entities are Fred" in refused(verb, wire, "delete", "Ann")
-    assert f"{wrong}, line 1: <robot name='r'> has 2 root links" in refused(verb, wire, "spawn", str(wrong))
+    assert f"{wrong}, line 1: <robot name='r'> has 2 root links" in refused(
+        verb, wire, "spawn", str(wrong)
+    )
     assert "no such" in refused(verb, wire, "spawn", str(tmp_path / "none.urdf")).lower()
     assert verb(wire, "spawn", HB_BOT, "--name", "a/*").returncode == 2
     assert [line.split()[0] for line in done(verb, wire, "list").splitlines()] == ["Fred"]
 
 
-def test_a_second_robot_at_the_root_is_refused_with_what_helps(verb: Verb, wire: Wire, sim: Process) -> None:
+def test_a_second_robot_at_the_root_is_refused_with_what_helps(
+    verb: Verb, wire: Wire, sim: Process
+) -> None:
     root = ("--namespace", "/")
     done(verb, wire, "spawn", HB_BOT, *root)
     taken = (
-        "cmd_vel is the key of 'hb_bot'; delete that one, or use a namespace; --namespace NAME (-robot_namespace NAME)"
+        "cmd_vel is the key of 'hb_bot'; delete that one, or use a namespace; --namespace "
+        "NAME (-robot_namespace NAME)"
     )
     for more in ((), ("--replace",)):
         told = refused(verb, wire, "spawn", HB_BOT, "--name", "Other", "-x", "5", *root, *more)
         assert told == f"holozen spawn: {taken} gives one\n"
-    assert "--replace takes its place, --name gives another" in refused(verb, wire, "spawn", HB_BOT, *root, "-x", "5")
+    assert "--replace takes its place, --name gives another" in refused(
+        verb, wire, "spawn", HB_BOT, *root, "-x", "5"
+    )
     done(verb, wire, "spawn", HB_BOT, "--name", "Other", "-x", "5", "--namespace", "lab")
     done(verb, wire, "spawn", HB_BOT, "--name", "hb_bot", "--replace", *root)
 
 
-def test_a_name_that_is_none_is_refused_by_the_sim_too(verb: Verb, wire: Wire, sim: Process) -> None:
-    """A robot called `*` would drive them all; a look-alike letter would pass for another robot's."""
+def test_a_name_that_is_none_is_refused_by_the_sim_too(
+    verb: Verb, wire: Wire, sim: Process
+) -> None:
+    """A robot called `*` would drive them all; a look-alike letter would pass for another
+    robot's.
+    """
     bus, text = wire.bus(), expand_xacro(Path(HB_BOT))
     for name in ("*", "**", "$*", "a/b", "..", "F\0", "Fred\n", "\u0391nn", "x" * 5000):
         request = si.SpawnEntityRequest(name, resource_string=text)
@@ -149,7 +171,9 @@ def test_a_name_that_is_none_is_refused_by_the_sim_too(verb: Verb, wire: Wire, s
     assert verb(wire, "list").stdout == ""
 
 
-def test_a_robot_that_is_replaced_stays_where_it_was_and_stands(verb: Verb, wire: Wire, sim: Process) -> None:
+def test_a_robot_that_is_replaced_stays_where_it_was_and_stands(
+    verb: Verb, wire: Wire, sim: Process
+) -> None:
     done(verb, wire, "spawn", HB_BOT, "--name", "Fred", "-x", "2")
     fred = Robot(wire.bus(), "Fred")
     fred.drive(0.5)
@@ -159,26 +183,44 @@ def test_a_robot_that_is_replaced_stays_where_it_was_and_stands(verb: Verb, wire
     assert distance(after, fred.pass_time(0.5)) < 1e-6
 
 
-def test_a_robot_is_not_spawned_into_another_nor_is_one_deleted_for_it(verb: Verb, wire: Wire, sim: Process) -> None:
+def test_a_robot_is_not_spawned_into_another_nor_is_one_deleted_for_it(
+    verb: Verb, wire: Wire, sim: Process
+) -> None:
     done(verb, wire, "spawn", HB_BOT, "--name", "Fred")
     done(verb, wire, "spawn", HB_BOT, "--name", "Ann", "-x", "5")
     told = refused(verb, wire, "spawn", HB_BOT, "--name", "Bob", "-x", "0.6")
-    assert "no room for 'Bob' at x 0.6 y 0: it would be inside 'Fred'; the nearest free place is " in told
+    assert (
+        "no room for 'Bob' at x 0.6 y 0: it would be inside 'Fred'; the nearest free place is "
+        in told
+    )
     assert told.endswith("; -x, -y and -z choose the place\n")
-    assert "inside 'Ann'" in refused(verb, wire, "spawn", HB_BOT, "--name", "Fred", "--replace", "-x", "5.5")
+    assert "inside 'Ann'" in refused(
+        verb, wire, "spawn", HB_BOT, "--name", "Fred", "--replace", "-x", "5.5"
+    )
     told = refused(verb, wire, "spawn", HB_BOT, "--name", "Fred", "--replace", "--namespace", "Ann")
-    assert told == "holozen spawn: Ann/cmd_vel is the key of 'Ann'; delete that one, or use another namespace\n"
+    assert (
+        told == "holozen spawn: Ann/cmd_vel is the key of 'Ann'; delete that one, or use another "
+        "namespace\n"
+    )
     told = refused(verb, wire, "spawn", HB_BOT, "--name", "Zed", "-x", "20", "-z", "-1")
-    assert "at x 20 y 0 z -1: it would be 0.96 m below the ground; the lowest free z is -0.04; -x, -y and -z " in told
+    assert (
+        "at x 20 y 0 z -1: it would be 0.96 m below the ground; the lowest free z is -0.04; -x, "
+        "-y and -z " in told
+    )
     told = refused(verb, wire, "spawn", HB_BOT, "--count", "2", "--grid", "1", "-y", "5")
     assert re.search(
-        r"1 of 2 were spawned, without (bot[01]): there is no room for '\1' at .*; .* --grid more than 1 m", told
+        r"1 of 2 were spawned, without (bot[01]): there is no room for '\1' at .*; .* --grid more "
+        r"than 1 m",
+        told,
     )
     ann, fred, bot = [line.split()[0] for line in done(verb, wire, "list").splitlines()]
-    assert (ann, fred) == ("Ann", "Fred") and bot in ("bot0", "bot1")  # one of the two requests came first
+    # one of the two requests came first
+    assert (ann, fred) == ("Ann", "Fred") and bot in ("bot0", "bot1")
 
 
-def test_a_robot_deleted_while_it_drives_leaves_no_key_alive(verb: Verb, wire: Wire, sim: Process) -> None:
+def test_a_robot_deleted_while_it_drives_leaves_no_key_alive(
+    verb: Verb, wire: Wire, sim: Process
+) -> None:
     bus = wire.bus()
     before = keys(bus)
     done(verb, wire, "spawn", HB_BOT, "--name", "Fred")
@@ -201,7 +243,12 @@ def test_many_robots_in_a_row_leave_no_key_and_little_memory_and_the_sim_keeps_i
     before, clock = keys(bus), bus.latest("clock", Clock)
 
     def spawn_and_delete(name: str) -> None:
-        bus.call("spawn_entity", si.SpawnEntityRequest(name, resource_string=text), si.SpawnEntityReply, timeout=20)
+        bus.call(
+            "spawn_entity",
+            si.SpawnEntityRequest(name, resource_string=text),
+            si.SpawnEntityReply,
+            timeout=20,
+        )
         bus.call("delete_entity", si.DeleteEntityRequest(name), si.DeleteEntityReply, timeout=20)
 
     for number in range(5):  # what is made once
@@ -227,7 +274,10 @@ def test_a_topic_that_the_robots_file_names_is_published_to_by_its_readers_type(
 ) -> None:
     text = expand_xacro(Path(HB_BOT)).replace("<commandTopic>cmd_vel<", "<commandTopic>go<")
     (tmp_path / "r.urdf").write_text(text)
-    assert done(verb, wire, "spawn", str(tmp_path / "r.urdf"), "--name", "Fred") == "Fred listens on Fred/go\n"
+    assert (
+        done(verb, wire, "spawn", str(tmp_path / "r.urdf"), "--name", "Fred")
+        == "Fred listens on Fred/go\n"
+    )
     fred = Robot(wire.bus(), "Fred")
     pub = wire.start("topic", "pub", "Fred/go", '{"linear": {"x": 0.3}}')
     fred.odom.next(lambda odom: odom.twist.twist.linear.x > 0.29)
@@ -240,12 +290,17 @@ def test_a_fleet_is_spawned_on_a_grid(verb: Verb, wire: Wire, sim: Process) -> N
     assert reported == "bot0 .. bot4 listen on bot0/cmd_vel .. bot4/cmd_vel\n"
     lines = [line.split() for line in done(verb, wire, "list").splitlines()]
     assert [(name, x, y) for name, _, x, _, y, *_ in lines] == [
-        ("bot0", "1.000", "0.000"), ("bot1", "2.500", "0.000"), ("bot2", "4.000", "0.000"), ("bot3", "1.000", "1.500"),
+        ("bot0", "1.000", "0.000"),
+        ("bot1", "2.500", "0.000"),
+        ("bot2", "4.000", "0.000"),
+        ("bot3", "1.000", "1.500"),
         ("bot4", "2.500", "1.500"),
-    ]  # fmt: skip
+    ]
     assert "5 of these exist already, such as bot0; --name gives another name" in refused(
         verb, wire, "spawn", HB_BOT, "--count", "6"
     )
-    assert done(verb, wire, "spawn", HB_BOT, "--count", "1", "--name", "Ann", "-x", "-5").startswith("Ann0 .. Ann0 ")
+    assert done(
+        verb, wire, "spawn", HB_BOT, "--count", "1", "--name", "Ann", "-x", "-5"
+    ).startswith("Ann0 .. Ann0 ")
     assert verb(wire, "spawn", HB_BOT, "--count", "2", "--replace").returncode == 2
     Robot(wire.bus(), "bot4").drive(0.3)

@@ -1,4 +1,6 @@
-"""A software stop outlasts the sim, however that ends; where nobody knows whether a robot was stopped, it is."""
+"""A software stop outlasts the sim, however that ends; where nobody knows whether a robot was
+stopped, it is.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +16,9 @@ from .robots import URDF
 
 BOT = URDF / "hb_bot.urdf.xacro"
 ROBOTS = ("--robot", f"{BOT}=Fred", "--robot", f"{BOT}=Ann")
-FULL = 'mount -t tmpfs -o size=8k tmpfs "$1" && head -c 100000 /dev/zero > "$1/fill"; shift; exec "$@"'
+FULL = (
+    'mount -t tmpfs -o size=8k tmpfs "$1" && head -c 100000 /dev/zero > "$1/fill"; shift; exec "$@"'
+)
 
 
 def start(wire: Wire, state: Path) -> Process:
@@ -45,7 +49,9 @@ def setter(bus: Bus, name: str) -> str:
     return status.stopped
 
 
-def test_a_sim_that_is_killed_and_started_again_has_the_same_robots_stopped(wire: Wire, tmp_path: Path) -> None:
+def test_a_sim_that_is_killed_and_started_again_has_the_same_robots_stopped(
+    wire: Wire, tmp_path: Path
+) -> None:
     sim, bus = start(wire, tmp_path), wire.bus("person")
     ask(bus, "Fred/stop")
     (file,) = tmp_path.glob("*/*")
@@ -65,23 +71,41 @@ def test_a_sim_that_is_killed_and_started_again_has_the_same_robots_stopped(wire
 
 
 WRITTEN: dict[str, Callable[[str], list[str]]] = {
-    "the name of this machine": lambda point: ["--connect", point.replace("127.0.0.1", "localhost"), "--listen", point],
-    "one more endpoint": lambda point: ["--connect", "tcp/127.0.0.1:1", "--connect", point, "--listen", point],
-}  # fmt: skip
+    "the name of this machine": lambda point: [
+        "--connect",
+        point.replace("127.0.0.1", "localhost"),
+        "--listen",
+        point,
+    ],
+    "one more endpoint": lambda point: [
+        "--connect",
+        "tcp/127.0.0.1:1",
+        "--connect",
+        point,
+        "--listen",
+        point,
+    ],
+}
 
 
 @pytest.mark.parametrize("how", WRITTEN)
-def test_a_stop_outlasts_other_words_for_the_same_network(wire: Wire, tmp_path: Path, how: str) -> None:
+def test_a_stop_outlasts_other_words_for_the_same_network(
+    wire: Wire, tmp_path: Path, how: str
+) -> None:
     sim, bus = start(wire, tmp_path), wire.bus("person")
     ask(bus, "Fred/stop")
     sim.kill()
-    with Process([*command("sim", *ROBOTS, "--state", str(tmp_path)), *WRITTEN[how](wire.endpoint)]) as sim:
+    with Process(
+        [*command("sim", *ROBOTS, "--state", str(tmp_path)), *WRITTEN[how](wire.endpoint)]
+    ) as sim:
         sim.wait_for_line("sim: Fred is still stopped by person@")
         sim.wait_for_line("Ann listens on")
         assert "Ann is still" not in sim.err
 
 
-def test_a_robot_whose_file_is_damaged_is_stopped_until_its_release(wire: Wire, tmp_path: Path) -> None:
+def test_a_robot_whose_file_is_damaged_is_stopped_until_its_release(
+    wire: Wire, tmp_path: Path
+) -> None:
     sim, bus = start(wire, tmp_path), wire.bus("person")
     ask(bus, "Fred/stop")
     sim.kill()
@@ -115,7 +139,10 @@ def test_a_full_disk_neither_delays_nor_ends_a_stop(wire: Wire, tmp_path: Path) 
             for _ in range(2):
                 reply = bus.call(f"{name}/stop", TriggerRequest(), TriggerReply, timeout=20)
                 assert reply.success
-                problem = f"{name}.stop: No space left on device: stops hold, but not beyond the end of this process"
+                problem = (
+                    f"{name}.stop: No space left on device: stops hold, but not beyond the "
+                    "end of this process"
+                )
                 assert problem in reply.message
             sim.wait_for_line(problem)
             assert setter(bus, name).startswith("person@")

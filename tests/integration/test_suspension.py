@@ -1,4 +1,6 @@
-"""Ctrl-Z suspends a launch and `holozen up` with all that they have started, so that no robot is driven on."""
+"""Ctrl-Z suspends a launch and `holozen up` with all that they have started, so that no robot is
+driven on.
+"""
 
 import os
 import signal
@@ -77,20 +79,28 @@ def test_ctrl_z_in_the_teleop_of_up_suspends_all_of_it(wire: Wire, shell: Termin
     parts = parts_at(wire)
     assert {"up", "sim", "pose-service", "controller", "teleop"} <= set(parts)
     shell.type(CTRL_Z)
-    wait_for(lambda: {state_of(pid) for pid in parts.values()} == {"T"}, what="all parts to be suspended")
+    wait_for(
+        lambda: {state_of(pid) for pid in parts.values()} == {"T"}, what="all parts to be suspended"
+    )
     shell.type("fg\r")
-    wait_for(lambda: "T" not in {state_of(pid) for pid in parts.values()}, what="all parts to go on")
+    wait_for(
+        lambda: "T" not in {state_of(pid) for pid in parts.values()}, what="all parts to go on"
+    )
     shell.wait_for_text("controller@")
     shell.type("\x03")
     wait_for(lambda: parts_at(wire) == {})
 
 
-def test_a_signal_to_up_alone_suspends_its_parts_and_killed_then_it_leaves_none(wire: Wire, shell: Terminal) -> None:
+def test_a_signal_to_up_alone_suspends_its_parts_and_killed_then_it_leaves_none(
+    wire: Wire, shell: Terminal
+) -> None:
     shell.type(" ".join(command("up", *wire.flags)) + " < /dev/null\r")
     robot = Robot(wire.bus())
     robot.odom.next(lambda odom: not rests(odom))
     parts = parts_at(wire)
     os.kill(parts["up"], signal.SIGTSTP)
-    wait_for(lambda: {state_of(pid) for pid in parts.values()} == {"T"}, what="all parts to be suspended")
+    wait_for(
+        lambda: {state_of(pid) for pid in parts.values()} == {"T"}, what="all parts to be suspended"
+    )
     os.kill(parts["up"], signal.SIGKILL)
     wait_for(lambda: parts_at(wire) == {}, what="the end of what a killed `up` had started")

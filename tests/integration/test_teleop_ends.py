@@ -44,7 +44,10 @@ def driving(robot: Robot, terminal: Terminal) -> Terminal:
 def assert_tidy(terminal: Terminal) -> None:
     """The terminal has its modes, its first screen and its cursor again."""
     assert terminal.modes() == terminal.modes_before
-    last = {code: terminal.raw.rfind(f"\x1b[?{code}") for code in ("1049h", "1049l", "25l", "25h", "2004h", "2004l")}
+    last = {
+        code: terminal.raw.rfind(f"\x1b[?{code}")
+        for code in ("1049h", "1049l", "25l", "25h", "2004h", "2004l")
+    }
     assert last["1049h"] < last["1049l"], "the full screen was left"
     assert last["25l"] < last["25h"], "the cursor is shown"
     assert last["2004h"] < last["2004l"], "paste is plain again"
@@ -55,7 +58,9 @@ def test_without_a_terminal_it_reports_that_in_one_line(town: Wire) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP], ids=lambda n: n.name)
-def test_a_signal_stops_the_robot_and_leaves_the_terminal_tidy(town: Wire, robot: Robot, number: int) -> None:
+def test_a_signal_stops_the_robot_and_leaves_the_terminal_tidy(
+    town: Wire, robot: Robot, number: int
+) -> None:
     with driving(robot, town.terminal("teleop", *DRIVES_ON)) as terminal:
         terminal.process.signal(number)
         assert terminal.process.wait() == 0
@@ -94,7 +99,9 @@ def test_ctrl_c_that_was_typed_during_a_pause_quits(town: Wire, robot: Robot) ->
         assert_tidy(terminal)
 
 
-def test_a_size_that_changes_after_the_terminal_was_given_back_changes_nothing(town: Wire, robot: Robot) -> None:
+def test_a_size_that_changes_after_the_terminal_was_given_back_changes_nothing(
+    town: Wire, robot: Robot
+) -> None:
     with town.terminal("teleop") as terminal:
         terminal.wait_for_text("listening")
         for number in (signal.SIGTSTP, signal.SIGWINCH, signal.SIGCONT, signal.SIGTERM):
@@ -134,11 +141,15 @@ def test_an_exception_stops_the_robot_and_is_one_error_line(
         commands.next(lambda command: any(planar(command)))
         robot.wait_for_stop_command()
         assert_tidy(terminal)
-        assert "teleop: RuntimeError: broken on purpose; a stop was sent to the robot" in terminal.raw
+        assert (
+            "teleop: RuntimeError: broken on purpose; a stop was sent to the robot" in terminal.raw
+        )
         assert "Traceback" not in terminal.raw
 
 
-def test_the_stop_arrives_though_a_subscriber_of_cmd_vel_reads_nothing(town: Wire, robot: Robot) -> None:
+def test_the_stop_arrives_though_a_subscriber_of_cmd_vel_reads_nothing(
+    town: Wire, robot: Robot
+) -> None:
     with deaf(town, "cmd_vel"), driving(robot, town.terminal("teleop", *DRIVES_ON)) as terminal:
         assert terminal.process.terminate() == 0
         robot.stands()
@@ -158,7 +169,9 @@ def test_a_teleop_whose_sim_is_gone_quits_all_the_same(wire: Wire) -> None:
     def stops() -> int:
         return sum(not any(planar(command)) for command in robot.commands.messages())
 
-    wait_for(lambda: stops() > 5, what="stops, which are repeated for a second where there is no odom")
+    wait_for(
+        lambda: stops() > 5, what="stops, which are repeated for a second where there is no odom"
+    )
     robot.wait_for_stop_command()
     assert_tidy(terminal)
 

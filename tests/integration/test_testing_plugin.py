@@ -66,20 +66,26 @@ def run_pytest(folder: Path, tests: str, *flags: str) -> subprocess.CompletedPro
 
 def running_at(text: str) -> list[str]:
     """The processes that run holozen and name this text."""
-    shown = subprocess.run(["ps", "-eo", "pid,args"], capture_output=True, text=True, check=True).stdout
+    shown = subprocess.run(
+        ["ps", "-eo", "pid,args"], capture_output=True, text=True, check=True
+    ).stdout
     return [line for line in shown.splitlines() if "-m holozen" in line and text in line]
 
 
-def test_a_user_tests_a_robot_without_an_import_of_ours_each_test_on_a_wire_of_its_own(tmp_path: Path) -> None:
+def test_a_user_tests_a_robot_without_an_import_of_ours_each_test_on_a_wire_of_its_own(
+    tmp_path: Path,
+) -> None:
     done = run_pytest(tmp_path, USERS_TESTS + TWO_WIRES)
     assert done.returncode == 0, done.stdout
     assert "3 passed" in done.stdout
 
 
 IN_VAIN = {
-    "wait_for(lambda: [], within=0.1, what='rain')": "waited 0.1 s in vain for rain; the last look gave []",
+    "wait_for(lambda: [], within=0.1, what='rain')": "waited 0.1 s in vain for rain; the last "
+    "look gave []",
     "wire.start('router').wait_for_line('tea', within=0.5)": "'tea' from <",
-    "wire.start('sim', '--rtf', 'x').wait_for_line('tea')": "exit code 2> ended without 'tea'; it wrote:",
+    "wire.start('sim', '--rtf', 'x').wait_for_line('tea')": "exit code 2> ended without 'tea'; it "
+    "wrote:",
     "wire.start('router').wait(within=0.1)": "still runs after 0.1 s; it wrote:",
     "terminal('topic', 'list').wait_for_text('tea')": "ended without 'tea' on its screen:",
     "lock_step('--nonsense')": "no flag '--nonsense'",
@@ -90,7 +96,9 @@ IN_VAIN = {
 
 
 HEAVY = ["zenoh", "msgspec", "numpy", "pybullet", "pyte"]
-WITHOUT_FIXTURES = f"import sys\ndef test_first():\n    assert not set({HEAVY}) & set(sys.modules)\n"
+WITHOUT_FIXTURES = (
+    f"import sys\ndef test_first():\n    assert not set({HEAVY}) & set(sys.modules)\n"
+)
 FAILS = """
 def test_that_fails(wire):
     wire.start("router").wait_for_line("listens at")
@@ -108,8 +116,14 @@ def test_without_pyte(terminal, monkeypatch):
 @pytest.fixture(scope="module")
 def shown(tmp_path_factory: pytest.TempPathFactory) -> str:
     """What one run of pytest shows of a test that passes, and of many that fail."""
-    vain = [f"def test_{n}(wire, terminal, wait_for, lock_step):\n    {test}\n" for n, test in enumerate(IN_VAIN)]
-    done = run_pytest(tmp_path_factory.mktemp("failing"), "\n".join([WITHOUT_FIXTURES, FAILS, *vain, WITHOUT_PYTE]))
+    vain = [
+        f"def test_{n}(wire, terminal, wait_for, lock_step):\n    {test}\n"
+        for n, test in enumerate(IN_VAIN)
+    ]
+    done = run_pytest(
+        tmp_path_factory.mktemp("failing"),
+        "\n".join([WITHOUT_FIXTURES, FAILS, *vain, WITHOUT_PYTE]),
+    )
     assert done.returncode == 1
     return done.stdout
 
@@ -153,3 +167,35 @@ def test_it(wire):
     assert run_pytest(tmp_path, test).returncode == -signal.SIGKILL
     pid = (tmp_path / "pid").read_text()
     wait_for(lambda: not Path(f"/proc/{pid}").exists(), what="the end of the router")
+
+
+LEAVES = """
+from holozen.messages import Odometry
+
+def test_it_flies(wire, wait_for):
+    wire.start("sim").wait_for_line("listens on")
+    odom = wire.bus().latest("odom", Odometry)
+    wait_for(lambda: odom.count > 5)
+    assert odom.read()[0].pose.pose.position.z > 1, "it does not"
+
+def test_it_stands(wire):
+    wire.start("sim").wait_for_line("listens on")
+"""
+
+
+def test_a_failed_test_leaves_a_bag_a_picture_and_the_logs(tmp_path: Path) -> None:
+    done = run_pytest(tmp_path, LEAVES, "--holozen-artifacts", "left", "--junit-xml", "junit.xml")
+    assert "1 failed, 1 passed" in done.stdout
+    assert "it does not" in (tmp_path / "junit.xml").read_text()
+    (left,) = (tmp_path / "left").iterdir()
+    assert left.name == "test_mine.py_test_it_flies"
+    assert {path.name for path in left.iterdir()} == {
+        "1-record.log",
+        "2-sim.log",
+        "bag.mcap",
+        "paths.png",
+        "picture.log",
+    }
+    assert "listens on cmd_vel" in (left / "2-sim.log").read_text()
+    assert (left / "paths.png").read_bytes().startswith(b"\x89PNG")
+    assert b"nav_msgs/msg/Odometry" in (left / "bag.mcap").read_bytes()

@@ -65,7 +65,9 @@ def chatter(bus: Bus, node: str, name: str, low: float) -> Callable[[], None]:
 
     def speak() -> None:
         value = r.Parameter(name, r.ParameterValue.of(low + next(values) % 2))
-        assert bus.call(f"{node}/set_parameters", r.SetParametersRequest([value]), r.SetParametersReply)
+        assert bus.call(
+            f"{node}/set_parameters", r.SetParametersRequest([value]), r.SetParametersReply
+        )
 
     return speak
 
@@ -82,7 +84,9 @@ def fill(speak: Callable[[], None], output: int) -> None:
         speak()
 
 
-def test_services_go_on_and_end_with_their_stderr_unread(wire: Wire, new_unread: Callable[[], int]) -> None:
+def test_services_go_on_and_end_with_their_stderr_unread(
+    wire: Wire, new_unread: Callable[[], int]
+) -> None:
     outputs = {verb: new_unread() for verb in ("sim", "pose-service", "controller")}
     services = [wire.start(verb, stderr=output) for verb, output in outputs.items()]
     robot = Robot(wire.bus())
@@ -159,7 +163,9 @@ except ExternalShutdownException:
 """
 
 
-def test_a_script_whose_log_is_unread_goes_on_and_ends_with_a_signal(wire: Wire, unread: int, tmp_path: Path) -> None:
+def test_a_script_whose_log_is_unread_goes_on_and_ends_with_a_signal(
+    wire: Wire, unread: int, tmp_path: Path
+) -> None:
     script = tmp_path / "talker.py"
     script.write_text(LOGS)
     lines = wire.bus().subscribe("lines", Point)

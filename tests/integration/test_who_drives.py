@@ -1,4 +1,6 @@
-"""A person beats a script beats the autopilot, and no overruled source takes the robot back by itself."""
+"""A person beats a script beats the autopilot, and no overruled source takes the robot back by
+itself.
+"""
 
 from collections.abc import Callable, Iterator
 
@@ -27,7 +29,9 @@ def hand(wire: Wire, node: str, priority: str) -> Hand:
 
 @pytest.fixture
 def patient(robot: Robot) -> Iterator[Robot]:
-    """The robot, for tests in which a source has to stay fresh on a busy machine: it stops after SILENCE only."""
+    """The robot, for tests in which a source has to stay fresh on a busy machine: it stops after
+    SILENCE only.
+    """
     yield robot.wait_longer(SILENCE)
     robot.wait_longer(COMMAND_SILENCE)
 
@@ -43,18 +47,15 @@ def script(town: Wire, sim: Process) -> Hand:
 
 
 @pytest.fixture(scope="module")
-def other_script(town: Wire, sim: Process) -> Hand:
-    return hand(town, "other", SCRIPT)
-
-
-@pytest.fixture(scope="module")
 def autopilot(town: Wire, sim: Process) -> Hand:
     return hand(town, "autopilot", AUTOPILOT)
 
 
-def drive(robot: Robot, hand: Hand, x: float, *others: tuple[Hand, float], obeyed: str = "") -> CommandStatus:
-    """Command until the robot goes at `x` and its status names the source `obeyed`, while the others want something
-    else all the time. The status.
+def drive(
+    robot: Robot, hand: Hand, x: float, *others: tuple[Hand, float], obeyed: str = ""
+) -> CommandStatus:
+    """Command until the robot goes at `x` and its status names the source `obeyed`, while the
+    others want something else all the time. The status.
     """
 
     def going() -> CommandStatus | None:
@@ -95,108 +96,40 @@ def test_a_person_overrules_a_script_and_a_script_the_autopilot(
     assert (status.priority, status.held) == (PERSON, True)
 
 
-@pytest.mark.usefixtures("patient")
-def test_a_lower_one_that_begins_while_a_higher_one_drives_does_not_move_the_robot(
-    robot: Robot, person: Hand, script: Hand, autopilot: Hand
-) -> None:
-    drive(robot, person, 0.3)
-    odom = robot.odom.from_now()
-    drive(robot, person, 0.4, (script, -0.9), (autopilot, -0.9))
-    drive(robot, person, 0.3, (script, -0.9), (autopilot, -0.9))
-    assert all(odom.twist.twist.linear.x > 0 for odom in odom.messages())
-
-
-@pytest.mark.parametrize("overruled", ["script", "autopilot"])
 def test_when_the_person_falls_silent_the_robot_stands_until_resume(
-    robot: Robot, person: Hand, script: Hand, autopilot: Hand, overruled: str
+    robot: Robot, person: Hand, script: Hand
 ) -> None:
-    lower = {"script": script, "autopilot": autopilot}[overruled]
-    drive(robot, lower, 0.1)
-    drive(robot, person, 0.3, (lower, 0.1))
+    drive(robot, script, 0.1)
+    drive(robot, person, 0.3, (script, 0.1))
 
     def stands() -> bool:
-        lower(0.1)
+        script(0.1)
         return rests(robot.newest())
 
     wait_for(stands)
-    status = refused(robot, lower, "held")
+    status = refused(robot, script, "held")
     assert status.obeyed == ""
     assert rests(robot.newest())
     assert robot.resume() == "every source may drive"
-    drive(robot, lower, 0.1)
+    drive(robot, script, 0.1)
 
 
-def test_an_autopilot_that_never_drove_is_held_too_after_a_person_did(
+@pytest.mark.usefixtures("patient")
+def test_resume_is_refused_while_a_person_drives_and_granted_at_once_after_a_stop(
     robot: Robot, person: Hand, autopilot: Hand
 ) -> None:
     drive(robot, person, 0.3)
-    robot.stands()
-    refused(robot, autopilot, "held")
-    assert rests(robot.newest())
-
-
-def test_a_script_that_a_person_starts_after_driving_may_drive(robot: Robot, person: Hand, script: Hand) -> None:
-    drive(robot, person, 0.3)
-    robot.stands()
-    drive(robot, script, 0.2)
-
-
-@pytest.mark.usefixtures("patient")
-def test_among_equals_the_one_that_drives_goes_on(robot: Robot, script: Hand, other_script: Hand) -> None:
-    drive(robot, script, 0.2)
-    odoms, before = robot.odom.from_now(), robot.last_status().refused.get("overruled", 0)
-
-    def refused_ten_times() -> bool:
-        other_script(0.9)
-        script(0.2)
-        robot.newest()
-        return bool(robot.last_status().refused.get("overruled", 0) >= before + 10)
-
-    wait_for(refused_ten_times)
-    assert all(moves(odom, 0.2, 0, 0) for odom in odoms.messages())
-
-
-@pytest.mark.usefixtures("patient")
-def test_an_equal_may_stop_the_robot_and_then_the_other_is_held(robot: Robot, script: Hand, other_script: Hand) -> None:
-    drive(robot, script, 0.2)
-    other_script(0.0)
-    robot.stands()
-    refused(robot, script, "overruled")
-    robot.pass_time(SILENCE + 0.2)
-    refused(robot, script, "held")
-    assert rests(robot.newest())
-
-
-def test_an_equal_takes_over_once_the_other_is_silent(robot: Robot, script: Hand, other_script: Hand) -> None:
-    drive(robot, script, 0.2)
-    robot.stands()
-    drive(robot, other_script, 0.3)
-
-
-@pytest.mark.usefixtures("patient")
-def test_resume_is_refused_while_a_person_drives(robot: Robot, person: Hand) -> None:
-    drive(robot, person, 0.3)
     with pytest.raises(ServiceError, match=r"person@.* drives; stop first"):
         robot.resume()
-    drive(robot, person, 0.3)
-
-
-def test_resume_is_granted_as_soon_as_the_person_has_stopped(robot: Robot, person: Hand, autopilot: Hand) -> None:
     drive(robot, person, 0.3)
     drive(robot, person, 0.0)
     assert robot.resume()
     drive(robot, autopilot, 0.1)
 
 
-@pytest.mark.usefixtures("patient")
-def test_a_stop_of_a_person_stops_a_driving_autopilot(robot: Robot, person: Hand, autopilot: Hand) -> None:
-    drive(robot, autopilot, 0.2)
-    person(0.0)
-    robot.stands()
-    refused(robot, autopilot, "overruled")
-
-
-def test_controller_resume_reports_the_sims_reply(verb: Verb, town: Wire, robot: Robot, person: Hand) -> None:
+def test_controller_resume_reports_the_sims_reply(
+    verb: Verb, town: Wire, robot: Robot, person: Hand
+) -> None:
     drive(robot, person, 0.3)
     robot.stands()
     done = verb(town, "controller", "--resume")
@@ -205,4 +138,6 @@ def test_controller_resume_reports_the_sims_reply(verb: Verb, town: Wire, robot:
 
 
 def test_controller_resume_without_a_sim_reports_it(verb: Verb, wire: Wire) -> None:
-    assert_one_line(verb(wire, "controller", "--resume"), 1, "controller: no reply from 'resume' within 5 s")
+    assert_one_line(
+        verb(wire, "controller", "--resume"), 1, "controller: no reply from 'resume' within 5 s"
+    )

@@ -1,4 +1,6 @@
-"""Worlds from SDF files: what stands in them stands there, and robots push it, climb it, and stop at it."""
+"""Worlds from SDF files: what stands in them stands there, and robots push it, climb it, and stop
+at it.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -18,7 +20,7 @@ DISC = """<robot name="disc"><link name="base">
   <collision><origin xyz="0 0 0.06"/><geometry><box size="0.3 0.3 0.1"/></geometry></collision>
   <collision><origin xyz="0.1 0 0.06"/><geometry><sphere radius="0.06"/></geometry></collision>
   <collision><origin xyz="-0.1 0 0.06"/><geometry><sphere radius="0.06"/></geometry></collision>
-</link></robot>"""
+</link></robot>"""  # noqa: E501
 
 
 @pytest.fixture(scope="module")
@@ -71,9 +73,12 @@ def test_a_robot_pushes_a_ball(arena: LockStep) -> None:
 
 def test_a_robot_climbs_the_ramp(arena: LockStep) -> None:
     x = where(arena, "ramp")[0]
-    drive(arena, 0, 1, until=lambda odom: place(odom)[1] > 2.5)  # to its foot, not to the edge at its side
+    # to its foot, not to the edge at its side
+    drive(arena, 0, 1, until=lambda odom: place(odom)[1] > 2.5)
     drive(arena, 1, 0, until=lambda odom: place(odom)[0] > x)
-    drive(arena, 0, -0.5, until=lambda odom: odom.pose.pose.position.z > 0.15 or place(odom)[1] < -1)
+    drive(
+        arena, 0, -0.5, until=lambda odom: odom.pose.pose.position.z > 0.15 or place(odom)[1] < -1
+    )
     arena.drive()
     stood = arena.step(24)
     assert moves(stood, 0, 0, 0, tolerance=0.01) and stood.pose.pose.position.z > 0.1

@@ -18,7 +18,8 @@ from holozen.testing import Process, wait_for
 COLUMNS, ROWS = 100, 32
 QUICK = {"LIBGL_ALWAYS_SOFTWARE": "1", "KITTY_ENABLE_WAYLAND": "0"}
 
-# What runs in kitty in place of a shell: it starts what it is given, and reports how the terminal was left.
+# What runs in kitty in place of a shell: it starts what it is given, and reports how the terminal
+# was left.
 SHELL = """
 import json, os, re, socket, subprocess, sys, termios, tty
 channel = socket.socket(socket.AF_UNIX)
@@ -57,7 +58,8 @@ class Display:
     def __init__(self) -> None:
         ours, its = os.pipe()
         self._server = Process(
-            ["Xvfb", "-displayfd", "1", "-screen", "0", "1000x800x24", "-nolisten", "tcp"], stdout=its
+            ["Xvfb", "-displayfd", "1", "-screen", "0", "1000x800x24", "-nolisten", "tcp"],
+            stdout=its,
         )
         os.close(its)
         with open(ours) as chosen:
@@ -73,11 +75,15 @@ class Display:
 
     def run(self, *words: str) -> str:
         """Run a client of the X server, such as xdotool, until it ends. Returns its output."""
-        done = subprocess.run(words, env=os.environ | self.env, capture_output=True, text=True, timeout=20, check=True)
+        done = subprocess.run(
+            words, env=os.environ | self.env, capture_output=True, text=True, timeout=20, check=True
+        )
         return done.stdout
 
     def keys(self, *words: str) -> None:
-        """`keys("keydown", "shift", "keydown", "j")`: xdotool's commands; a number is the code of a key."""
+        """`keys("keydown", "shift", "keydown", "j")`: xdotool's commands; a number is the code of a
+        key.
+        """
         self.run("xdotool", *words)
 
     @property
@@ -106,7 +112,14 @@ class Kitty:
             door.listen()
             door.settimeout(60)
             self._process = Process(
-                [*_kitty(self._dump, self._class), sys.executable, "-S", "-c", SHELL, str(folder / "door")],
+                [
+                    *_kitty(self._dump, self._class),
+                    sys.executable,
+                    "-S",
+                    "-c",
+                    SHELL,
+                    str(folder / "door"),
+                ],
                 env={**display.env, "HOME": str(folder), "KITTY_CONFIG_DIRECTORY": str(folder)},
             )
             try:
@@ -161,7 +174,9 @@ class Kitty:
 
     def _windows(self) -> list[str]:
         with contextlib.suppress(subprocess.CalledProcessError):
-            return self.display.run("xdotool", "search", "--onlyvisible", "--class", self._class).split()
+            return self.display.run(
+                "xdotool", "search", "--onlyvisible", "--class", self._class
+            ).split()
         return []
 
 
@@ -213,8 +228,8 @@ class Program:
             self.ended()
 
     def ended(self) -> dict[str, Any]:
-        """Wait for its end. Returns its exit "code", whether the terminal's "modes" are as before, and the keyboard
-        "flags" of both screens.
+        """Wait for its end. Returns its exit "code", whether the terminal's "modes" are as before,
+        and the keyboard "flags" of both screens.
         """
         if self._left is None:
             self._left = self.kitty.reply()
@@ -222,7 +237,22 @@ class Program:
 
 
 def _kitty(dump: Path, window_class: str) -> list[str]:
-    options = ("confirm_os_window_close=0", "update_check_interval=0", "remember_window_size=no", "font_size=8",
-               f"initial_window_width={COLUMNS}c", f"initial_window_height={ROWS}c")  # fmt: skip
+    options = (
+        "confirm_os_window_close=0",
+        "update_check_interval=0",
+        "remember_window_size=no",
+        "font_size=8",
+        f"initial_window_width={COLUMNS}c",
+        f"initial_window_height={ROWS}c",
+    )
     overrides = [word for option in options for word in ("-o", option)]
-    return ["kitty", "--class", window_class, "--config", "NONE", *overrides, "--dump-bytes", str(dump)]
+    return [
+        "kitty",
+        "--class",
+        window_class,
+        "--config",
+        "NONE",
+        *overrides,
+        "--dump-bytes",
+        str(dump),
+    ]

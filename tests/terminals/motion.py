@@ -10,10 +10,13 @@ from tests.integration.robots import Part, Record, Robot, moves, planar
 
 OFTEN = 100 if os.environ.get("HOLOZEN_LONG") else 1
 """How often a test that looks for a race runs; scripts/test --long asks for the whole hundred."""
-MISSED = ("does not answer", "answers again", "paused:")
-"""The teleop's line after a terminal, or it itself, was held up: a key of that time does not count."""
-PATIENCE = 2.0  # s until a key that moved nothing may have been one of those; longer than a key is ignored
-HOLD_UP = 0.2  # s that a few processes wait for a processor together, where the machine is too busy to keep time
+MISSED = ("does not answer", "answers again", "paused:", "press a key again")
+"""The teleop's line after a terminal, or it itself, was held up: a key of that time does not count.
+"""
+# s until a key that moved nothing may have been one of those; longer than a key is ignored
+PATIENCE = 2.0
+# s that a few processes wait for a processor together, where the machine is too busy to keep time
+HOLD_UP = 0.2
 
 
 def drives(robot: Robot, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> None:
@@ -26,10 +29,14 @@ def stands(robot: Robot) -> None:
 
 
 def press_until(
-    shown: Callable[[], object], press: Callable[[], object], let_go: Callable[[], object], screen: Callable[[], str]
+    shown: Callable[[], object],
+    press: Callable[[], object],
+    let_go: Callable[[], object],
+    screen: Callable[[], str],
 ) -> None:
-    """Press a key, and wait for its effect. A busy machine may hold a terminal up for longer than the teleop waits for
-    its answer: if the screen shows that, the key is pressed again, as a person would.
+    """Press a key, and wait for its effect. A busy machine may hold a terminal up for longer than
+    the teleop waits for its answer: if the screen shows that, the key is pressed again, as a person
+    would.
     """
     for _ in range(5):
         press()
@@ -91,9 +98,11 @@ def _waited(pid: int) -> dict[str, float]:
     return waited
 
 
-def assert_drives_on(robot: Robot, motion: tuple[float, ...], again: Callable[[], object], *pids: int) -> None:
-    """Check that the robot gets this motion and no other for a second. A second in which these processes waited for a
-    processor proves nothing: the robot is then made to drive `again`.
+def assert_drives_on(
+    robot: Robot, motion: tuple[float, ...], again: Callable[[], object], *pids: int
+) -> None:
+    """Check that the robot gets this motion and no other for a second. A second in which these
+    processes waited for a processor proves nothing: the robot is then made to drive `again`.
     """
     for _ in range(5):
         commands, held_up = robot.commands.from_now(), HeldUp(*pids)
@@ -101,6 +110,8 @@ def assert_drives_on(robot: Robot, motion: tuple[float, ...], again: Callable[[]
         reported = {planar(command) for command in commands.messages()}
         if reported == {motion}:
             return
-        assert held_up.seconds() > HOLD_UP, f"it was commanded {reported} on a machine that kept time"
+        assert held_up.seconds() > HOLD_UP, (
+            f"it was commanded {reported} on a machine that kept time"
+        )
         again()
     raise AssertionError(f"it was commanded {reported}, five times")

@@ -17,7 +17,7 @@ from holozen.transport.connection import Connection
 from holozen.transport.errors import BusError
 from holozen.wire import key_for
 from tests.faults.proxy import Proxy
-from tests.integration.robots import speeds, time_of
+from tests.integration.robots import sent_at, speeds, time_of
 
 from .motion import press_until
 from .played import KITTY, REPEAT, Played, event
@@ -40,7 +40,7 @@ BOX = f"""<robot name="box">
     </plugin>
   </gazebo>
 </robot>
-"""
+"""  # noqa: E501
 
 
 class Witness:
@@ -57,7 +57,9 @@ class Witness:
         return self.seen[-1][0]
 
     def time_at(self, at: float) -> float:
-        """The time of the last odom that was sent before `at`, as of time.monotonic; waits for the next one."""
+        """The time of the last odom that was sent before `at`, as of time.monotonic; waits for the
+        next one.
+        """
         wait_for(lambda: self._sent and self._sent[-1] > at, what="odom")
         return self.seen[bisect(self._sent, at) - 1][0]
 
@@ -82,9 +84,9 @@ class Witness:
         with contextlib.suppress(BusError):
             while True:
                 received = self._odom.recv()
-                if (odom := received.message) and (stamp := received.stamp):
+                if odom := received.message:
                     self.seen.append((time_of(odom), max(map(abs, speeds(odom)))))
-                    self._sent.append(stamp.sent)
+                    self._sent.append(sent_at(received))
 
 
 class Operator:
@@ -102,8 +104,12 @@ class Operator:
     def __exit__(self, *_error: object) -> None:
         self.leave()
 
-    def sit_down(self, script: Path | None = None, shell: bool = False, line: bool = False) -> Played:
-        """Start the teleop, or this script in its place, in a shell with job control, over a line that can be cut."""
+    def sit_down(
+        self, script: Path | None = None, shell: bool = False, line: bool = False
+    ) -> Played:
+        """Start the teleop, or this script in its place, in a shell with job control, over a line
+        that can be cut.
+        """
         flags: Sequence[str] = self._wire.flags
         if line:
             self.line = Proxy(self._wire.port)
@@ -128,7 +134,9 @@ class Operator:
         """Hold a key until the robot moves; to and fro, so that it stays in place."""
         self._count += 1
         self.key = (FORWARD, BACKWARD)[self._count % 2]
-        press_until(self.witness.moving, lambda: self.at.press(self.key), self.let_go, self.at.screen)
+        press_until(
+            self.witness.moving, lambda: self.at.press(self.key), self.let_go, self.at.screen
+        )
 
     def hold_on(self) -> None:
         """Go on holding the key: it repeats."""
@@ -146,7 +154,10 @@ class Operator:
     def foreground(self) -> None:
         """Bring the job to the foreground once it has stopped."""
         job = self.job()
-        wait_for(lambda: Path(f"/proc/{job}/stat").read_text().rpartition(")")[2].split()[0] == "T", what="its stop")
+        wait_for(
+            lambda: Path(f"/proc/{job}/stat").read_text().rpartition(")")[2].split()[0] == "T",
+            what="its stop",
+        )
         self.at.type("\r")
 
     def cut(self) -> None:

@@ -19,7 +19,9 @@ FOCUS_IN, FOCUS_OUT = "\x1b[I", "\x1b[O"
 
 
 class Kind(NamedTuple):
-    """What a terminal answers. `keyboard`: it speaks the Kitty keyboard protocol; the others are "" for no answer."""
+    """What a terminal answers. `keyboard`: it speaks the Kitty keyboard protocol; the others are ""
+    for no answer.
+    """
 
     keyboard: bool = False
     device: str = ""
@@ -34,12 +36,18 @@ DUMB = Kind(False, "", "")
 
 
 class Played(Terminal):
-    """A terminal of some kind. `late`: seconds until it answers. `kind` may be changed while it runs. `kept`: keys that
-    come with its next answers, the first with the first of them: in one breath, or so many seconds `apart`.
+    """A terminal of some kind. `late`: seconds until it answers. `kind` may be changed while it
+    runs. `kept`: keys that come with its next answers, the first with the first of them: in one
+    breath, or so many seconds `apart`.
     """
 
     def __init__(
-        self, words: Sequence[str], kind: Kind, *, late: float = 0.0, env: Mapping[str, str] | None = None
+        self,
+        words: Sequence[str],
+        kind: Kind,
+        *,
+        late: float = 0.0,
+        env: Mapping[str, str] | None = None,
     ) -> None:
         self.kind, self.late = kind, late
         self.asked: list[str] = []  # the questions so far
@@ -47,7 +55,8 @@ class Played(Terminal):
         self.apart = 0.0
         self._answers = ""
         self._alternate = False
-        self.pushed: dict[bool, list[int]] = {False: [], True: []}  # of both screens; the last is on
+        # of both screens; the last is on
+        self.pushed: dict[bool, list[int]] = {False: [], True: []}
         self._rest = b""
         super().__init__(words, env=env)
 
@@ -58,7 +67,9 @@ class Played(Terminal):
 
     @property
     def flags_left(self) -> dict[bool, list[int]]:
-        """The flags pushed and not popped, of the main screen (False) and of the alternate one (True)."""
+        """The flags pushed and not popped, of the main screen (False) and of the alternate one
+        (True).
+        """
         return {screen: flags for screen, flags in self.pushed.items() if flags}
 
     def down(self, code: int) -> None:
@@ -141,8 +152,12 @@ class Played(Terminal):
             self.type(answers + keys)
 
 
-def event(code: int, modifiers: int = 0, kind: int = PRESS, *, shifted: int = 0, base: int = 0) -> str:
+def event(
+    code: int, modifiers: int = 0, kind: int = PRESS, *, shifted: int = 0, base: int = 0
+) -> str:
     """A key as kitty reports it with all flags, without the parts that are not needed."""
-    codes = f"{code}:{shifted or ''}:{base}" if base else f"{code}:{shifted}" if shifted else f"{code}"
+    codes = (
+        f"{code}:{shifted or ''}:{base}" if base else f"{code}:{shifted}" if shifted else f"{code}"
+    )
     suffix = f":{kind}" if kind != PRESS else ""
     return f"\x1b[{codes};{modifiers + 1}{suffix}u" if modifiers or suffix else f"\x1b[{codes}u"

@@ -1,4 +1,6 @@
-"""Where a terminal reports no releases, a repeating key drives without a stutter, and stops after its last repeat."""
+"""Where a terminal reports no releases, a repeating key drives without a stutter, and stops after
+its last repeat.
+"""
 
 import math
 import sys
@@ -10,7 +12,7 @@ from typing import NamedTuple
 import pytest
 
 from holozen.testing import Terminal, Wire, wait_for
-from tests.integration.robots import Robot, planar
+from tests.integration.robots import Robot, planar, sent_at
 
 from .broken import ROOT
 from .motion import Since, assert_nothing_moved
@@ -24,9 +26,9 @@ TRIES = 12
 
 
 class Hold(NamedTuple):
-    """What came of a key that was held, by the times at which the teleop sent its commands, as it does with each key
-    that it reads. `stutters`: stops while it repeated; `longest`: the longest interval between repeats, s; `after`:
-    from the last repeat to the stop, s.
+    """What came of a key that was held, by the times at which the teleop sent its commands, as it
+    does with each key that it reads. `stutters`: stops while it repeated; `longest`: the longest
+    interval between repeats, s; `after`: from the last repeat to the stop, s.
     """
 
     stutters: int
@@ -39,10 +41,11 @@ def hold(robot: Robot, terminal: Terminal) -> Hold:
     commands = robot.commands.from_now()
     typed = terminal.hold("i", DELAY + (REPEATS - 0.5) * INTERVAL, DELAY, INTERVAL)
     robot.wait_for_stop_command()
-    stamped = [(received.stamp, received.message) for received in commands.all()]
-    moves = [stamp.sent for stamp, message in stamped if stamp and message and any(planar(message))]
-    stops = [stamp.sent for stamp, message in stamped if stamp and message and not any(planar(message))]
-    read = [next((at for at in moves if at >= key), math.inf) for key in typed]  # inf: a key that was not obeyed
+    sent = [(sent_at(received), received.message) for received in commands.all()]
+    moves = [at for at, message in sent if message and any(planar(message))]
+    stops = [at for at, message in sent if message and not any(planar(message))]
+    # inf: a key that was not obeyed
+    read = [next((at for at in moves if at >= key), math.inf) for key in typed]
     stopped = next((at for at in stops if at > read[-1]), math.inf)
     stutters = sum(read[0] < at < read[-1] for at in stops)
     return Hold(stutters, max(b - a for a, b in pairwise(read[1:])), stopped - read[-1])
@@ -51,8 +54,9 @@ def hold(robot: Robot, terminal: Terminal) -> Hold:
 def test_a_held_key_drives_without_a_stutter_and_stops_one_interval_after_its_last_repeat(
     town: Wire, robot: Robot
 ) -> None:
-    """A busy machine types late, which is a stutter, and wakes the teleop late: one try that is as it should be is
-    enough. A teleop that is too slow is so always; test_key_state.py shows that it never stutters by itself.
+    """A busy machine types late, which is a stutter, and wakes the teleop late: one try that is as
+    it should be is enough. A teleop that is too slow is so always; test_key_state.py shows that it
+    never stutters by itself.
     """
     tries: list[tuple[Hold, ...]] = []
     steady = quick = False
@@ -104,7 +108,9 @@ def test_a_key_that_repeats_already_at_the_start_moves_nothing_until_it_was_let_
         robot.wait_for_stop_command()
 
 
-def test_another_key_takes_over_at_once_and_the_robot_stops_by_itself(town: Wire, robot: Robot) -> None:
+def test_another_key_takes_over_at_once_and_the_robot_stops_by_itself(
+    town: Wire, robot: Robot
+) -> None:
     with town.terminal("teleop") as terminal:
         terminal.wait_for_text("listening sim")
         since = Since(robot.odom)

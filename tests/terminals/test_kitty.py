@@ -48,7 +48,9 @@ def programs() -> Iterator[dict[tuple[str, ...], Program]]:
 
 
 @pytest.fixture
-def start(kitty: Kitty, town: Wire, robot: Robot, keys: Display, programs: dict[tuple[str, ...], Program]) -> Start:
+def start(
+    kitty: Kitty, town: Wire, robot: Robot, keys: Display, programs: dict[tuple[str, ...], Program]
+) -> Start:
     """`start("--mode", "latch")`: a teleop in kitty, ready for keys."""
 
     def start(*flags: str, words: list[str] | None = None) -> Program:
@@ -70,8 +72,15 @@ def start(kitty: Kitty, town: Wire, robot: Robot, keys: Display, programs: dict[
 def keys(display: Display, kitty: Kitty) -> Display:
     """The keyboard: no key is down, and kitty has the focus."""
     display.run("setxkbmap", "us")
-    display.keys("keyup", "shift", "keyup", "ctrl", "keyup", "space",
-                 *[word for key in (KEY_I, KEY_J, COMMA, KEY_C) for word in ("keyup", key)])  # fmt: skip
+    display.keys(
+        "keyup",
+        "shift",
+        "keyup",
+        "ctrl",
+        "keyup",
+        "space",
+        *[word for key in (KEY_I, KEY_J, COMMA, KEY_C) for word in ("keyup", key)],
+    )
     display.focus(kitty.window)
     return display
 
@@ -80,7 +89,9 @@ def keys(display: Display, kitty: Kitty) -> Display:
 def drive(keys: Display, robot: Robot) -> Drive:
     """`drive(program, "i", x=V)`: press keys until the robot moves so."""
 
-    def drive(program: Program, *names: str, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> None:
+    def drive(
+        program: Program, *names: str, x: float = 0.0, y: float = 0.0, turn: float = 0.0
+    ) -> None:
         since = Since(robot.odom)
         press_until(
             lambda: since.drove(x, y, turn),
@@ -125,7 +136,9 @@ def test_two_keys_together_are_one_motion_and_the_one_that_stays_goes_on(
     stands(robot)
 
 
-def test_diagonally_the_speed_is_the_speed(start: Start, keys: Display, robot: Robot, drive: Drive) -> None:
+def test_diagonally_the_speed_is_the_speed(
+    start: Start, keys: Display, robot: Robot, drive: Drive
+) -> None:
     drive(start(), "i", "shift", "j", x=DIAGONAL, y=DIAGONAL)
     keys.keys("keydown", "comma")
     drives(robot, y=V)
@@ -144,7 +157,9 @@ def test_with_shift_it_strafes_whichever_of_both_keys_is_let_go_first(
         assert_nothing_moves(robot)
 
 
-def test_space_stops_though_another_key_is_held(start: Start, keys: Display, robot: Robot, drive: Drive) -> None:
+def test_space_stops_though_another_key_is_held(
+    start: Start, keys: Display, robot: Robot, drive: Drive
+) -> None:
     program = start()
     drive(program, "i", x=V)
     keys.keys("key", "space")
@@ -172,9 +187,13 @@ def test_a_lost_focus_stops_and_its_return_with_the_key_still_held_moves_nothing
 
 
 def test_a_key_that_was_held_before_the_start_moves_nothing(
-    start: Start, keys: Display, robot: Robot, programs: dict[tuple[str, ...], Program], drive: Drive,
+    start: Start,
+    keys: Display,
+    robot: Robot,
+    programs: dict[tuple[str, ...], Program],
+    drive: Drive,
     trials: Callable[[int, int], int],
-) -> None:  # fmt: skip
+) -> None:
     for _ in range(trials(1, 5)):
         for program in programs.values():
             program.end()
@@ -189,7 +208,9 @@ def test_a_key_that_was_held_before_the_start_moves_nothing(
         stands(robot)
 
 
-def test_latched_a_key_sets_the_motion_until_another(start: Start, keys: Display, robot: Robot, drive: Drive) -> None:
+def test_latched_a_key_sets_the_motion_until_another(
+    start: Start, keys: Display, robot: Robot, drive: Drive
+) -> None:
     program = start("--mode", "latch")
     drive(program, "i", x=V)
     keys.keys("keyup", "i")
@@ -216,11 +237,18 @@ def test_a_deadman_needs_space_too(start: Start, keys: Display, robot: Robot, dr
     keys.keys("keyup", "space")
 
 
-def test_other_keyboards_drive_with_the_same_keys(start: Start, keys: Display, robot: Robot, drive: Drive) -> None:
+def test_other_keyboards_drive_with_the_same_keys(
+    start: Start, keys: Display, robot: Robot, drive: Drive
+) -> None:
     program = start()
     for layout in ("de", "fr", "ru", "gr"):
-        keys.run("setxkbmap", layout)  # kitty is busy with it, perhaps for longer than an answer is waited for
-        for names, motion in (((KEY_I,), (V, 0, 0)), ((COMMA,), (-V, 0, 0)), ((SHIFT, KEY_J), (0, V, 0))):
+        # kitty is busy with it, perhaps for longer than an answer is waited for
+        keys.run("setxkbmap", layout)
+        for names, motion in (
+            ((KEY_I,), (V, 0, 0)),
+            ((COMMA,), (-V, 0, 0)),
+            ((SHIFT, KEY_J), (0, V, 0)),
+        ):
             x, y, turn = motion
             drive(program, *names, x=x, y=y, turn=turn)
             for name in names:
@@ -239,7 +267,11 @@ def test_a_key_let_go_after_the_keyboard_was_changed_stops(
 
 
 def test_what_is_pasted_by_the_mouse_never_drives(
-    start: Start, keys: Display, kitty: Kitty, robot: Robot, programs: dict[tuple[str, ...], Program]
+    start: Start,
+    keys: Display,
+    kitty: Kitty,
+    robot: Robot,
+    programs: dict[tuple[str, ...], Program],
 ) -> None:
     for program in programs.values():
         program.end()
@@ -248,7 +280,10 @@ def test_what_is_pasted_by_the_mouse_never_drives(
     commands = robot.commands.from_now()
     keys.keys("mousemove", "--window", kitty.window, "100", "100", "click", "2")
     press_until(  # the key after it was read
-        lambda: "0.440 m/s" in program.screen(), lambda: keys.keys("key", "w"), lambda: None, program.screen
+        lambda: "0.440 m/s" in program.screen(),
+        lambda: keys.keys("key", "w"),
+        lambda: None,
+        program.screen,
     )
     robot.newest()
     assert commands.messages() == []
@@ -278,7 +313,12 @@ def test_a_kitty_that_hangs_stops_the_robot_and_what_it_kept_back_moves_nothing(
 
 
 def assert_left_tidy(program: Program, code: int) -> None:
-    assert program.ended() == {"code": code, "modes": True, "flags": "0", "flags of the other screen": "0"}
+    assert program.ended() == {
+        "code": code,
+        "modes": True,
+        "flags": "0",
+        "flags of the other screen": "0",
+    }
 
 
 def test_ctrl_c_quits_and_leaves_the_keyboard_as_it_was(
@@ -317,7 +357,9 @@ def test_a_crash_leaves_the_keyboard_as_it_was(
     keys.keys("keyup", "i")
 
 
-def test_a_window_that_is_closed_stops_the_robot(display: Display, folder: Path, town: Wire, robot: Robot) -> None:
+def test_a_window_that_is_closed_stops_the_robot(
+    display: Display, folder: Path, town: Wire, robot: Robot
+) -> None:
     with Kitty(display, folder) as kitty:
         program = kitty.run(command("teleop", *SPEEDS, *town.flags))
         program.wait_for_text("listening sim")

@@ -1,4 +1,6 @@
-"""In tmux and screen the teleop drives; detached or with its window closed, a robot that is latched stands."""
+"""In tmux and screen the teleop drives; detached or with its window closed, a robot that is latched
+stands.
+"""
 
 import contextlib
 import os
@@ -37,7 +39,9 @@ class Multiplexer:
 
     def shown(self) -> str:
         """What the program shows now, or nothing if that cannot be read."""
-        return subprocess.run([*self._tmux, "capture-pane", "-p"], capture_output=True, text=True).stdout
+        return subprocess.run(
+            [*self._tmux, "capture-pane", "-p"], capture_output=True, text=True
+        ).stdout
 
     def end(self) -> None:
         """End it and everything that runs in it."""
@@ -63,13 +67,17 @@ class Screen(Multiplexer):
         return ""
 
     def end(self) -> None:
-        subprocess.run(["screen", "-S", "it", "-X", "quit"], env=os.environ | self.env, capture_output=True)
+        subprocess.run(
+            ["screen", "-S", "it", "-X", "quit"], env=os.environ | self.env, capture_output=True
+        )
 
 
-@pytest.fixture(params=[
-    pytest.param(Multiplexer, id="tmux", marks=pytest.mark.needs("tmux")),
-    pytest.param(Screen, id="screen", marks=pytest.mark.needs("screen")),
-])  # fmt: skip
+@pytest.fixture(
+    params=[
+        pytest.param(Multiplexer, id="tmux", marks=pytest.mark.needs("tmux")),
+        pytest.param(Screen, id="screen", marks=pytest.mark.needs("screen")),
+    ]
+)
 def multiplexer(request: pytest.FixtureRequest, folder: Path) -> Iterator[Multiplexer]:
     made = request.param(folder)
     yield made
@@ -114,7 +122,9 @@ def test_a_latched_robot_stands_while_the_line_to_its_operator_hangs(
     multiplexer: Multiplexer, windows: contextlib.ExitStack, town: Wire, robot: Robot
 ) -> None:
     """tmux and screen go on answering; the operator's window is a suspended process of theirs."""
-    window = windows.enter_context(multiplexer.new(command("teleop", "--mode", "latch", *town.flags)))
+    window = windows.enter_context(
+        multiplexer.new(command("teleop", "--mode", "latch", *town.flags))
+    )
     window.wait_for_text("listening sim")
     drive(window, robot, "i", x=0.5)
     window.process.signal(signal.SIGSTOP)
@@ -123,10 +133,13 @@ def test_a_latched_robot_stands_while_the_line_to_its_operator_hangs(
         assert_nothing_moves(robot)
     finally:
         window.process.signal(signal.SIGCONT)
-    # The second where the multiplexer itself answered too late, the third where odom did, the last where the teleop was
-    # held up.
+    # The second where the multiplexer itself answered too late, the third where odom did, the last
+    # where the teleop was held up.
     reasons = ("press it again", "press a key to drive", "press a key again to drive", "paused:")
-    wait_for(lambda: any(reason in window.screen() for reason in reasons), what=lambda: f"either in {window.screen()}")
+    wait_for(
+        lambda: any(reason in window.screen() for reason in reasons),
+        what=lambda: f"either in {window.screen()}",
+    )
     drive(window, robot, "i", x=0.5)
     window.type("\x03")
     assert window.process.wait() == 0
@@ -135,15 +148,22 @@ def test_a_latched_robot_stands_while_the_line_to_its_operator_hangs(
 def test_a_key_drives_while_it_repeats_and_a_paste_moves_nothing(
     multiplexer: Multiplexer, windows: contextlib.ExitStack, town: Wire, robot: Robot
 ) -> None:
-    window = windows.enter_context(multiplexer.new(command("teleop", "--speed", str(V), *town.flags)))
+    window = windows.enter_context(
+        multiplexer.new(command("teleop", "--speed", str(V), *town.flags))
+    )
     window.wait_for_text("listening sim")
     commands = robot.commands.from_now()
     window.type("\x1b[200~iiii\x1b[201~")
     press_until(  # what follows the paste was read
-        lambda: "0.360 m/s" in window.screen(), lambda: window.type("x"), lambda: None, window.screen
+        lambda: "0.360 m/s" in window.screen(),
+        lambda: window.type("x"),
+        lambda: None,
+        window.screen,
     )
     robot.newest()
     assert [(r.source, r.message) for r in commands.all()] == []
     since = Since(robot.odom)
-    press_until(lambda: since.drove(x=0.9 * V), lambda: window.hold("i", 0.7), lambda: None, window.screen)
+    press_until(
+        lambda: since.drove(x=0.9 * V), lambda: window.hold("i", 0.7), lambda: None, window.screen
+    )
     stands(robot)

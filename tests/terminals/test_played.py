@@ -1,4 +1,6 @@
-"""Terminals of other kinds, and those that lose something: a key that is not certain to be held does not drive."""
+"""Terminals of other kinds, and those that lose something: a key that is not certain to be held
+does not drive.
+"""
 
 import os
 import signal
@@ -39,7 +41,7 @@ from .played import (
     Kind,
     Played,
     event,
-)  # fmt: skip
+)
 
 V, W = 0.4, 0.8  # m/s, rad/s
 KEY_I, KEY_J, KEY_L, KEY_W, SPACE = map(ord, "ijlw ")
@@ -49,7 +51,9 @@ Start = Callable[..., Played]
 
 def sit_down(town: Wire, kind: Kind, *flags: str, late: float = 0.0) -> Played:
     """A teleop in such a terminal, ready for keys."""
-    terminal = Played(command("teleop", "--speed", str(V), "--turn", str(W), *flags, *town.flags), kind, late=late)
+    terminal = Played(
+        command("teleop", "--speed", str(V), "--turn", str(W), *flags, *town.flags), kind, late=late
+    )
     terminal.wait_for_text("listening: sim" if "--plain" in flags else "listening sim")
     if kind.keyboard:
         wait_for(lambda: terminal.flags == 15, what="the releases to be asked for")
@@ -88,10 +92,22 @@ def terminal(shared_terminals: list[Played], town: Wire, robot: Robot) -> Played
     return shared_terminals[-1]
 
 
-def drive(terminal: Played, robot: Robot, key: int = KEY_I, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> None:
+def drive(
+    terminal: Played,
+    robot: Robot,
+    key: int = KEY_I,
+    x: float = 0.0,
+    y: float = 0.0,
+    turn: float = 0.0,
+) -> None:
     """Press a key until the robot moves so."""
     since = Since(robot.odom)
-    press_until(lambda: since.drove(x, y, turn), lambda: terminal.down(key), lambda: terminal.up(key), terminal.screen)
+    press_until(
+        lambda: since.drove(x, y, turn),
+        lambda: terminal.down(key),
+        lambda: terminal.up(key),
+        terminal.screen,
+    )
 
 
 def assert_a_new_press_drives(terminal: Played, robot: Robot) -> None:
@@ -100,10 +116,14 @@ def assert_a_new_press_drives(terminal: Played, robot: Robot) -> None:
     stands(robot)
 
 
-def test_in_a_terminal_without_releases_a_key_drives_while_it_repeats(start: Start, robot: Robot) -> None:
+def test_in_a_terminal_without_releases_a_key_drives_while_it_repeats(
+    start: Start, robot: Robot
+) -> None:
     terminal = start(CONSOLE)
     since = Since(robot.odom)
-    press_until(lambda: since.drove(x=V), lambda: terminal.hold("i", 0.7), lambda: None, terminal.screen)
+    press_until(
+        lambda: since.drove(x=V), lambda: terminal.hold("i", 0.7), lambda: None, terminal.screen
+    )
     stands(robot)
     assert terminal.flags_left == {}
     assert "\x1b[>" not in terminal.raw, "an old Linux console would print the rest"
@@ -128,7 +148,9 @@ def test_a_lost_focus_stops_until_a_new_press(terminal: Played, robot: Robot) ->
     assert_a_new_press_drives(terminal, robot)
 
 
-def test_keys_that_moved_nothing_are_let_go_too_when_their_release_is_lost(start: Start, robot: Robot) -> None:
+def test_keys_that_moved_nothing_are_let_go_too_when_their_release_is_lost(
+    start: Start, robot: Robot
+) -> None:
     terminal = start(KITTY, "--deadman")
 
     def both() -> None:
@@ -161,7 +183,9 @@ def test_keys_that_moved_nothing_are_let_go_too_when_their_release_is_lost(start
     assert_i_was_let_go()
 
 
-def test_after_a_lost_release_the_same_key_stops_when_it_is_let_go_again(terminal: Played, robot: Robot) -> None:
+def test_after_a_lost_release_the_same_key_stops_when_it_is_let_go_again(
+    terminal: Played, robot: Robot
+) -> None:
     drive(terminal, robot, x=V)
     terminal.press(KEY_I)
     terminal.release(KEY_I)
@@ -189,7 +213,9 @@ def test_answers_that_come_late_but_in_time_change_nothing(start: Start, robot: 
     assert_drives_on(robot, (V, 0, 0, 0), again, os.getpid(), terminal.process.pid)
 
 
-def test_a_key_that_counts_for_long_is_watched_as_one_that_is_held(start: Start, robot: Robot) -> None:
+def test_a_key_that_counts_for_long_is_watched_as_one_that_is_held(
+    start: Start, robot: Robot
+) -> None:
     terminal = start(XTERM, "--key-timeout", "60")
     drive(terminal, robot, x=V)
     asked = len(terminal.asked)
@@ -204,7 +230,9 @@ def test_a_terminal_whose_answers_stop_coming_stops_the_robot(start: Start, robo
     stands(robot)
 
 
-@pytest.mark.parametrize(("kind", "mode"), [(KITTY, "hold"), (XTERM, "latch")], ids=["kitty held", "xterm latched"])
+@pytest.mark.parametrize(
+    ("kind", "mode"), [(KITTY, "hold"), (XTERM, "latch")], ids=["kitty held", "xterm latched"]
+)
 def test_a_hanging_terminal_stops_the_robot_and_keys_typed_during_it_move_nothing(
     start: Start, robot: Robot, kind: Kind, mode: str
 ) -> None:
@@ -220,19 +248,28 @@ def test_a_hanging_terminal_stops_the_robot_and_keys_typed_during_it_move_nothin
 
 
 # Which terminal, after how many seconds it answers, and how many later the keys come that it kept.
-BREATHS = [
-    (kind, late, apart) for kind in (KITTY, XTERM, TMUX) for late in (0.0, 0.1) for apart in (0.0, 0.01)
-] if OFTEN > 1 else [(KITTY, 0.0, 0.0), (KITTY, 0.0, 0.01), (XTERM, 0.1, 0.0)]  # fmt: skip
+BREATHS = (
+    [
+        (kind, late, apart)
+        for kind in (KITTY, XTERM, TMUX)
+        for late in (0.0, 0.1)
+        for apart in (0.0, 0.01)
+    ]
+    if OFTEN > 1
+    else [(KITTY, 0.0, 0.0), (KITTY, 0.0, 0.01), (XTERM, 0.1, 0.0)]
+)
 NAMES = {KITTY: "kitty", XTERM: "xterm", TMUX: "tmux"}
 
 
 @pytest.mark.parametrize("run", range(OFTEN))
-@pytest.mark.parametrize(("kind", "late", "apart"), BREATHS, ids=lambda value: NAMES.get(value, f"{value} s"))
+@pytest.mark.parametrize(
+    ("kind", "late", "apart"), BREATHS, ids=lambda value: NAMES.get(value, f"{value} s")
+)
 def test_keys_in_one_breath_with_the_answers_of_a_terminal_that_hung_move_nothing(
     start: Start, robot: Robot, kind: Kind, late: float, apart: float, run: int
 ) -> None:
-    """Neither with the answers to old queries nor with, or right after, the first answer to a new one; nor does a key
-    that is held from then on.
+    """Neither with the answers to old queries nor with, or right after, the first answer to a new
+    one; nor does a key that is held from then on.
     """
     terminal = start(kind, "--plain", "--mode", "latch", late=late)
     terminal.apart = apart
@@ -247,7 +284,8 @@ def test_keys_in_one_breath_with_the_answers_of_a_terminal_that_hung_move_nothin
     terminal.thaw()
     wait_for(lambda: not terminal.kept, what="two answers with keys")
     sent = terminal.hold(event(KEY_J, 0, REPEAT) if kind.keyboard else key, 0.5, 0.03, 0.03)
-    # Where only repeats are reported, a key that is silent for so long was let go: a busy machine typed too late.
+    # Where only repeats are reported, a key that is silent for so long was let go: a busy machine
+    # typed too late.
     if kind.keyboard or max(b - a for a, b in pairwise([thawed, *sent])) < 0.5:
         assert_nothing_moved(commands)
     if not kind.keyboard:
@@ -266,7 +304,12 @@ def test_pasted_text_never_drives(start: Start, robot: Robot) -> None:
 
     def assert_moves_nothing(pasted: str) -> None:
         before = speed()
-        for part in ("\x1b[200~", pasted[: len(pasted) // 2], pasted[len(pasted) // 2 :], "\x1b[201~"):
+        for part in (
+            "\x1b[200~",
+            pasted[: len(pasted) // 2],
+            pasted[len(pasted) // 2 :],
+            "\x1b[201~",
+        ):
             for begin in range(0, len(part), 4000):
                 terminal.type(part[begin : begin + 4000])
         press_until(  # what follows the text was read
@@ -278,12 +321,20 @@ def test_pasted_text_never_drives(start: Start, robot: Robot) -> None:
         robot.newest()
         assert commands.messages() == []
 
-    for pasted in ("iiii", f"{event(KEY_I)}{event(KEY_J)}", "k\r\ni\r\n", "i" * 100_000, "\x1b[200~i"):
+    for pasted in (
+        "iiii",
+        f"{event(KEY_I)}{event(KEY_J)}",
+        "k\r\ni\r\n",
+        "i" * 100_000,
+        "\x1b[200~i",
+    ):
         assert_moves_nothing(pasted)
 
 
 def test_another_terminal_that_does_not_speak_kitty_takes_over(start: Start, robot: Robot) -> None:
-    """As with `docker attach`: the teleop goes on in another window, while a key was held in the first."""
+    """As with `docker attach`: the teleop goes on in another window, while a key was held in the
+    first.
+    """
     terminal = start(KITTY)
     drive(terminal, robot, x=V)
     terminal.kind = XTERM
@@ -293,7 +344,9 @@ def test_another_terminal_that_does_not_speak_kitty_takes_over(start: Start, rob
     stands(robot)
 
 
-def test_a_window_of_another_size_without_releases_is_known_at_once(start: Start, robot: Robot) -> None:
+def test_a_window_of_another_size_without_releases_is_known_at_once(
+    start: Start, robot: Robot
+) -> None:
     terminal = start(KITTY)
     terminal.kind = XTERM
     terminal.resize(90, 30)
@@ -317,13 +370,17 @@ def test_after_a_while_without_a_terminal_the_next_one_drives(start: Start, robo
     assert_a_new_press_drives(terminal, robot)
 
 
-def test_another_terminal_that_speaks_kitty_too_is_asked_for_releases(terminal: Played, robot: Robot) -> None:
+def test_another_terminal_that_speaks_kitty_too_is_asked_for_releases(
+    terminal: Played, robot: Robot
+) -> None:
     terminal.pushed = {False: [], True: []}  # a window that was opened just now
     wait_for(lambda: terminal.flags == 15, what="the releases to be requested again")
     assert_a_new_press_drives(terminal, robot)
 
 
-def test_suspended_it_gives_the_keyboard_back_and_takes_it_again(town: Wire, sim: Process, robot: Robot) -> None:
+def test_suspended_it_gives_the_keyboard_back_and_takes_it_again(
+    town: Wire, sim: Process, robot: Robot
+) -> None:
     with Operator(town, robot.bus, "", sim.pid) as operator:
         terminal = operator.sit_down(shell=True)
         drive(terminal, robot, x=SPEED)
@@ -339,12 +396,18 @@ def test_suspended_it_gives_the_keyboard_back_and_takes_it_again(town: Wire, sim
         stands(robot)
 
 
-def test_after_the_computer_slept_a_key_must_be_pressed_again(town: Wire, robot: Robot, tmp_path: Path) -> None:
+def test_after_the_computer_slept_a_key_must_be_pressed_again(
+    town: Wire, robot: Robot, tmp_path: Path
+) -> None:
     """The monotonic clock stands still during it, and the release of a key may be lost."""
-    asleep = "import time; clock = time.monotonic; time.sleep(1); time.monotonic = lambda: clock() - 1"
+    asleep = (
+        "import time; clock = time.monotonic; time.sleep(1); time.monotonic = lambda: clock() - 1"
+    )
     script = tmp_path / "sleeps.py"
     script.write_text(SCRIPT.format(root=str(ROOT), statement=asleep))
-    with Played([sys.executable, str(script), "--speed", str(V), "--turn", str(W), *town.flags], KITTY) as terminal:
+    with Played(
+        [sys.executable, str(script), "--speed", str(V), "--turn", str(W), *town.flags], KITTY
+    ) as terminal:
         terminal.wait_for_text("listening sim")
         wait_for(lambda: terminal.flags == 15)
         drive(terminal, robot, x=V)

@@ -14,25 +14,49 @@ LIMITS = 0.9, 1.4  # m/s, rad/s
 
 # Forward, left, up (times the speed), counter-clockwise (times the turn).
 TABLE = {
-    "u": (1, 0, 0, 1), "i": (1, 0, 0, 0), "o": (1, 0, 0, -1),
-    "j": (0, 0, 0, 1), "l": (0, 0, 0, -1),
-    "m": (-1, 0, 0, -1), ",": (-1, 0, 0, 0), ".": (-1, 0, 0, 1),
-    "U": (1, 1, 0, 0), "I": (1, 0, 0, 0), "O": (1, -1, 0, 0),
-    "J": (0, 1, 0, 0), "L": (0, -1, 0, 0),
-    "M": (-1, 1, 0, 0), "<": (-1, 0, 0, 0), ">": (-1, -1, 0, 0),
-    "t": (0, 0, 1, 0), "b": (0, 0, -1, 0),
+    "u": (1, 0, 0, 1),
+    "i": (1, 0, 0, 0),
+    "o": (1, 0, 0, -1),
+    "j": (0, 0, 0, 1),
+    "l": (0, 0, 0, -1),
+    "m": (-1, 0, 0, -1),
+    ",": (-1, 0, 0, 0),
+    ".": (-1, 0, 0, 1),
+    "U": (1, 1, 0, 0),
+    "I": (1, 0, 0, 0),
+    "O": (1, -1, 0, 0),
+    "J": (0, 1, 0, 0),
+    "L": (0, -1, 0, 0),
+    "M": (-1, 1, 0, 0),
+    "<": (-1, 0, 0, 0),
+    ">": (-1, -1, 0, 0),
+    "t": (0, 0, 1, 0),
+    "b": (0, 0, -1, 0),
     # Ours besides: the arrows, with shift too.
-    "\x1b[A": (1, 0, 0, 0), "\x1b[B": (-1, 0, 0, 0), "\x1b[D": (0, 0, 0, 1), "\x1b[C": (0, 0, 0, -1),
-    "\x1b[1;2D": (0, 1, 0, 0), "\x1b[1;2C": (0, -1, 0, 0),
-}  # fmt: skip
+    "\x1b[A": (1, 0, 0, 0),
+    "\x1b[B": (-1, 0, 0, 0),
+    "\x1b[D": (0, 0, 0, 1),
+    "\x1b[C": (0, 0, 0, -1),
+    "\x1b[1;2D": (0, 1, 0, 0),
+    "\x1b[1;2C": (0, -1, 0, 0),
+}
 
 # The keys of the speeds, one after the other, and what each multiplies speed and turn by.
-SPEEDS = {"q": (1.1, 1.1), "z": (0.9, 0.9), "w": (1.1, 1), "x": (0.9, 1), "e": (1, 1.1), "c": (1, 0.9)}
+SPEEDS = {
+    "q": (1.1, 1.1),
+    "z": (0.9, 0.9),
+    "w": (1.1, 1),
+    "x": (0.9, 1),
+    "e": (1, 1.1),
+    "c": (1, 0.9),
+}
 
 
 def test_every_key_commands_what_it_does_there(town: Wire, robot: Robot) -> None:
     limits = ("--speed-limit", str(LIMITS[0]), "--turn-limit", str(LIMITS[1]))
-    with town.terminal("teleop", "--mode", "latch", "--speed", str(V), "--turn", str(W), *limits) as terminal:
+    with town.terminal(
+        "teleop", "--mode", "latch", "--speed", str(V), "--turn", str(W), *limits
+    ) as terminal:
         terminal.wait_for_text("listening sim")
 
         def type_until(keys: str, shown: Callable[[], object]) -> None:
@@ -52,12 +76,18 @@ def test_every_key_commands_what_it_does_there(town: Wire, robot: Robot) -> None
         def assert_commands(key: str, speed: float, turn: float) -> None:
             x, y, z, counter_clockwise = TABLE[key]
             typed("k", moves=False)
-            assert typed(key) == pytest.approx((x * speed, y * speed, z * speed, counter_clockwise * turn)), key
+            assert typed(key) == pytest.approx(
+                (x * speed, y * speed, z * speed, counter_clockwise * turn)
+            ), key
 
         def change(keys: str, speed: float, turn: float) -> None:
             """Type the keys that lead to these speeds."""
             type_until(
-                keys, lambda: all(f"{v:.3f} {u}" in terminal.screen() for v, u in ((speed, "m/s"), (turn, "rad/s")))
+                keys,
+                lambda: all(
+                    f"{v:.3f} {u}" in terminal.screen()
+                    for v, u in ((speed, "m/s"), (turn, "rad/s"))
+                ),
             )
 
         for key in TABLE:

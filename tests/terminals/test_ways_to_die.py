@@ -1,9 +1,10 @@
 """However the operator dies, or the way to them, the robot stands within half a second and a step.
 
-The times are those of the sim's own clock, from the last odom that was sent before the event to the first that shows
-rest; one comes at each step. So what the machine does to the test itself does not count, and what it does to sim and
-teleop is measured. SLACK is for the sim, which catches up by up to 0.1 s when it was late. scripts/safety-table writes
-the table of docs/safety.md from these runs.
+The times are those of the sim's own clock, from the last odom that was sent before the event to the
+first that shows rest; one comes at each step. So what the machine does to the test itself does not
+count, and what it does to sim and teleop is measured. SLACK is for the sim, which catches up by up
+to 0.1 s when it was late. scripts/safety-table writes the table of docs/evidence.md from these
+runs.
 """
 
 import json
@@ -31,13 +32,15 @@ pytestmark = pytest.mark.alone
 TOGETHER = 4
 BOUND = 0.5 + 1 / 240  # s
 SLACK = 0.15  # s
-TABLE = Path(__file__).parents[2] / "docs" / "safety.md"
+TABLE = Path(__file__).parents[2] / "docs" / "evidence.md"
 FIGURES = os.environ.get("HOLOZEN_WAYS_TO_DIE")
 """A file for the times, in seconds of sim time."""
 
 
 class Way(NamedTuple):
-    """`happens`: what is done to the operator; `undone`: what brings them back, "" where the teleop has ended."""
+    """`happens`: what is done to the operator; `undone`: what brings them back, "" where the
+    teleop has ended.
+    """
 
     happens: Callable[[Operator], object]
     undone: Callable[[Operator], object] | None = None
@@ -47,8 +50,8 @@ class Way(NamedTuple):
 
 
 class Death(NamedTuple):
-    """`seconds` of the sim's clock until the robot stood; `held_up`: s of that for which sim and teleop waited for a
-    processor.
+    """`seconds` of the sim's clock until the robot stood; `held_up`: s of that for which sim and
+    teleop waited for a processor.
     """
 
     seconds: float
@@ -66,7 +69,9 @@ WAYS = {
     "SIGHUP": Way(by(signal.SIGHUP)),
     "SIGQUIT": Way(by(signal.SIGQUIT)),
     "SIGTSTP": Way(
-        lambda operator: os.kill(operator.job(), signal.SIGTSTP), lambda operator: operator.foreground(), shell=True
+        lambda operator: os.kill(operator.job(), signal.SIGTSTP),
+        lambda operator: operator.foreground(),
+        shell=True,
     ),
     "SIGKILL": Way(by(signal.SIGKILL)),
     "SIGSTOP": Way(by(signal.SIGSTOP), by(signal.SIGCONT)),
@@ -74,8 +79,13 @@ WAYS = {
     "the terminal hangs, or the line to it": Way(
         lambda operator: operator.at.freeze(), lambda operator: operator.at.thaw()
     ),
-    "the window loses the focus": Way(lambda operator: operator.at.type(FOCUS_OUT), lambda operator: None),
-    **{f"an exception in {part}": Way(lambda operator: operator.at.press(ord("w")), part=part) for part in PARTS},
+    "the window loses the focus": Way(
+        lambda operator: operator.at.type(FOCUS_OUT), lambda operator: None
+    ),
+    **{
+        f"an exception in {part}": Way(lambda operator: operator.at.press(ord("w")), part=part)
+        for part in PARTS
+    },
     "the network is cut": Way(lambda operator: operator.cut(), line=True),
 }
 
@@ -135,7 +145,10 @@ def back(operator: Operator, end: float) -> None:
 
 
 def test_the_robot_stands_half_a_second_and_a_step_later(
-    operators: list[Operator], figures: dict[str, list[float]], tmp_path: Path, trials: Callable[[int, int], int]
+    operators: list[Operator],
+    figures: dict[str, list[float]],
+    tmp_path: Path,
+    trials: Callable[[int, int], int],
 ) -> None:
     scripts = {way.part: broken_teleop(tmp_path, way.part) for way in WAYS.values() if way.part}
     left = iter(list(WAYS) * trials(1, 20))  # that all share
@@ -155,14 +168,17 @@ def test_the_robot_stands_half_a_second_and_a_step_later(
     assert late == {}
 
 
-def test_a_network_that_comes_back_moves_nothing_until_a_key_is_pressed_again(operators: list[Operator]) -> None:
+def test_a_network_that_comes_back_moves_nothing_until_a_key_is_pressed_again(
+    operators: list[Operator],
+) -> None:
     with operators[0] as operator:
         operator.sit_down(line=True)
         operator.drive()
         begin = operator.witness.now()
         operator.cut()
         end = operator.witness.rest_after(begin)
-        wait_for(lambda: operator.witness.now() > end + 1.0)  # until both ends have given the session up
+        # until both ends have given the session up
+        wait_for(lambda: operator.witness.now() > end + 1.0)
         operator.restore()
         wait_for(lambda: operator.witness.now() > end + 2.5)
         assert not operator.witness.moved_after(end)
@@ -171,6 +187,10 @@ def test_a_network_that_comes_back_moves_nothing_until_a_key_is_pressed_again(op
 
 
 def test_the_table_in_the_docs_has_a_row_for_each_way() -> None:
-    table = TABLE.read_text().partition("<!-- ways-to-die -->\n")[2].partition("<!-- /ways-to-die -->")[0]
+    table = (
+        TABLE.read_text()
+        .partition("<!-- ways-to-die -->\n")[2]
+        .partition("<!-- /ways-to-die -->")[0]
+    )
     rows = [line.split("|")[1].strip() for line in table.splitlines()[2:] if line.startswith("|")]
     assert rows == list(WAYS)

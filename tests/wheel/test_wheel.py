@@ -1,4 +1,5 @@
-"""The wheel in clean environments: everything is in it, under one name, and each verb runs or reports why not.
+"""The wheel in clean environments: everything is in it, under one name, and each verb runs or
+reports why not.
 
 Nothing is downloaded: what the lock file already brought is lent to the new environments by path.
 """
@@ -19,8 +20,10 @@ from typing import Any
 import pytest
 
 from holozen.cli import VERBS
+from holozen.engines import choose
 from holozen.messages import Odometry
 from holozen.testing import Process, Terminal, Wire, wait_for
+from tests.checkout import copy
 
 REPO = Path(__file__).parents[2]
 NEEDED = ("eclipse-zenoh", "msgspec", "prompt-toolkit")
@@ -30,7 +33,9 @@ CLEAN = {"PYTHONPATH": ""}
 
 def run(*words: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     env = {**os.environ, **CLEAN}
-    return subprocess.run(list(map(str, words)), capture_output=True, text=True, timeout=120, env=env, cwd=cwd)
+    return subprocess.run(
+        list(map(str, words)), capture_output=True, text=True, timeout=120, env=env, cwd=cwd
+    )
 
 
 def good(*words: str | Path, cwd: Path | None = None) -> str:
@@ -43,13 +48,7 @@ def good(*words: str | Path, cwd: Path | None = None) -> str:
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The wheel, built from the source distribution, built from a copy of what the repo holds."""
     source, dist = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("dist")
-    listed = run("git", "ls-files", "--cached", "--others", "--exclude-standard", "-z", cwd=REPO)
-    if listed.returncode:
-        pytest.skip("not a git checkout")
-    for name in filter(None, listed.stdout.split("\0")):
-        if (REPO / name).is_file():
-            (source / name).parent.mkdir(parents=True, exist_ok=True)
-            (source / name).write_bytes((REPO / name).read_bytes())
+    copy(source)
     good(sys.executable, "-m", "build", "--no-isolation", "--outdir", dist, source)
     (sdist,) = dist.glob("*.tar.gz")
     assert sdist.stat().st_size < 2_000_000
@@ -62,15 +61,30 @@ def environment(folder: Path, wheel: Path, lent: Path) -> Path:
     good(sys.executable, "-m", "venv", "--without-pip", folder)
     (packages,) = folder.glob("lib/python*/site-packages")
     before = set(os.listdir(packages))
-    good(sys.executable, "-m", "pip", "--python", folder, "install", "--no-deps", "--no-index", "--quiet", wheel)
-    assert {name for name in set(os.listdir(packages)) - before if not name.endswith(".dist-info")} == {"holozen"}
+    good(
+        sys.executable,
+        "-m",
+        "pip",
+        "--python",
+        folder,
+        "install",
+        "--no-deps",
+        "--no-index",
+        "--quiet",
+        wheel,
+    )
+    assert {
+        name for name in set(os.listdir(packages)) - before if not name.endswith(".dist-info")
+    } == {"holozen"}
     (packages / "lent.pth").write_text(f"{lent}\n")
     return folder
 
 
 @pytest.fixture(scope="module")
 def full(bare: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An environment with every extra: a copy of the bare one, which takes less than to install the wheel again."""
+    """An environment with every extra: a copy of the bare one, which takes less than to install the
+    wheel again.
+    """
     folder = tmp_path_factory.mktemp("full") / "venv"
     shutil.copytree(bare, folder, symlinks=True)
     script = holozen(folder)
@@ -96,11 +110,15 @@ def holozen(environment: Path) -> Path:
 
 
 def answer(environment: Path, code: str) -> Any:
-    return json.loads(good(environment / "bin" / "python", "-I", "-c", f"import json\n{code}", cwd=environment))
+    return json.loads(
+        good(environment / "bin" / "python", "-I", "-c", f"import json\n{code}", cwd=environment)
+    )
 
 
 def test_the_wheel_declares_what_is_needed_without_any_extra(wheel: Path) -> None:
-    (name,) = [name for name in zipfile.ZipFile(wheel).namelist() if name.endswith(".dist-info/METADATA")]
+    (name,) = [
+        name for name in zipfile.ZipFile(wheel).namelist() if name.endswith(".dist-info/METADATA")
+    ]
     metadata = message_from_bytes(zipfile.ZipFile(wheel).read(name))
     declared = [line for line in metadata.get_all("Requires-Dist", []) if "extra ==" not in line]
     assert sorted(re.split("[<>=!~ ]", line)[0] for line in declared) == sorted(NEEDED)
@@ -114,17 +132,31 @@ def test_the_wheel_holds_one_package_and_nothing_of_the_tests(wheel: Path) -> No
 
 def test_every_file_of_the_library_and_the_services_is_in_the_wheel(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
-    for top, there in (("holozen", "holozen"), ("services", "holozen"), *((d, f"holozen/{d}") for d in DATA)):
-        files = [path for path in (REPO / top).rglob("*") if path.is_file() and "__pycache__" not in path.parts]
+    for top, there in (
+        ("holozen", "holozen"),
+        ("services", "holozen"),
+        *EXTENSIONS,
+        *((d, f"holozen/{d}") for d in DATA),
+    ):
+        files = [
+            path
+            for path in (REPO / top).rglob("*")
+            if path.is_file() and "__pycache__" not in path.parts
+        ]
         assert {f"{there}/{path.relative_to(REPO / top).as_posix()}" for path in files} <= names
 
 
 DATA = ("meshes", "urdf", "worlds")
+EXTENSIONS = [
+    (f"extensions/{path.parent.name}", f"holozen/{path.parent.name}")
+    for path in REPO.glob("extensions/*/__init__.py")
+]
 
 
 def test_there_is_no_package_called_services(full: Path) -> None:
     code = (
-        "from importlib.util import find_spec as f; print(json.dumps([f('services') is None, f('holozen.sim').origin]))"
+        "from importlib.util import find_spec as f; print(json.dumps([f('services') is None, "
+        "f('holozen.sim').origin]))"
     )
     none, origin = answer(full, code)
     assert none is True
@@ -156,12 +188,18 @@ print(json.dumps(helps))
 def test_every_verb_has_help_without_any_extra(bare: Path) -> None:
     helps = answer(bare, HELP)
     assert set(helps) == set(VERBS)
-    assert [verb for verb, shown in helps.items() if f"usage: holozen {verb}" not in shown and verb != "xacro"] == []
+    assert [
+        verb
+        for verb, shown in helps.items()
+        if f"usage: holozen {verb}" not in shown and verb != "xacro"
+    ] == []
 
 
 def test_data_files_are_found_inside_the_package(full: Path) -> None:
     for name in ("'urdf', 'hb_bot.urdf.xacro'", "'meshes', 'base.dae'", "'worlds', 'gazebo.world'"):
-        path = Path(answer(full, f"from holozen import data; print(json.dumps(str(data.find({name}))))"))
+        path = Path(
+            answer(full, f"from holozen import data; print(json.dumps(str(data.find({name}))))")
+        )
         assert path.is_file()
         assert full in path.parents
 
@@ -177,7 +215,9 @@ def test_the_sim_starts_from_the_wheel_and_publishes_odom(full: Path, wire: Wire
     with Process([str(holozen(full)), "sim", *wire.flags], env=CLEAN) as sim:
         wait_for(lambda: odom.count > 3, what=lambda: sim.err)
         assert sim.terminate() == 0
-        assert sim.err == "sim: hb_bot listens on cmd_vel\n"
+        engine, listens = sim.err.splitlines()
+        assert engine == f"sim: the engine is {choose()}"
+        assert listens == "sim: hb_bot listens on cmd_vel"
 
 
 SCRIPT = """
@@ -189,7 +229,7 @@ rclpy.init()
 node = Node("listener")
 node.create_subscription(Odometry, "odom", lambda odom: (print("heard", odom.child_frame_id), rclpy.shutdown()), 10)
 rclpy.spin(node)
-"""
+"""  # noqa: E501
 
 
 def test_a_first_hour_with_the_wheel(full: Path, wire: Wire, tmp_path: Path) -> None:
@@ -200,24 +240,40 @@ def test_a_first_hour_with_the_wheel(full: Path, wire: Wire, tmp_path: Path) -> 
             view.wait_for_line("http://127.0.0.1:")
             assert view.terminate() == 0
         good(holozen(full), "new", "robot", "rosie", cwd=tmp_path)
-        assert good(holozen(full), "check", "rosie.urdf.xacro", cwd=tmp_path).startswith("ok: 4 links, 3 wheels")
+        assert good(holozen(full), "check", "rosie.urdf.xacro", cwd=tmp_path).startswith(
+            "ok: 4 links, 3 wheels"
+        )
         (tmp_path / "listener.py").write_text(SCRIPT)
-        assert "heard footprint_link" in good(holozen(full), "run", *wire.flags, "listener.py", cwd=tmp_path)
-        good(holozen(full), "record", "odom", "-o", "drive", "--max-duration", "1", *wire.flags, cwd=tmp_path)
+        assert "heard footprint_link" in good(
+            holozen(full), "run", *wire.flags, "listener.py", cwd=tmp_path
+        )
+        good(
+            holozen(full),
+            "record",
+            "odom",
+            "-o",
+            "drive",
+            "--max-duration",
+            "1",
+            *wire.flags,
+            cwd=tmp_path,
+        )
         assert "odom" in good(holozen(full), "bag", "info", "drive.mcap", cwd=tmp_path)
         assert up.interrupt() == 0
 
 
 def test_templates_are_in_the_wheel(bare: Path, tmp_path: Path) -> None:
     good(holozen(bare), "new", "package", "ours", cwd=tmp_path)
-    assert "float32 voltage" in good(holozen(bare), "interface", "show", "ours/msg/Battery", cwd=tmp_path)
+    assert "float32 voltage" in good(
+        holozen(bare), "interface", "show", "ours/msg/Battery", cwd=tmp_path
+    )
 
 
 def test_the_sim_without_its_extra_names_it(bare: Path, wire: Wire) -> None:
     done = run(holozen(bare), "sim", *wire.flags)
     assert (done.returncode, done.stdout) == (1, "")
-    advice = r"in the checkout of holozen, run: pip install -e '\.\[sim\]'"
-    assert re.fullmatch(rf"holozen sim needs (numpy|pybullet|xacro); {advice}\n", done.stderr)
+    advice = r"in the checkout of holozen, run: uv pip install -e '\.\[sim\]'"  # there is no pip
+    assert re.fullmatch(rf"holozen sim needs (numpy|xacro); {advice}\n", done.stderr)
 
 
 def test_the_teleop_needs_no_extra(bare: Path, wire: Wire) -> None:
@@ -254,7 +310,10 @@ def test_yaml_without_its_library_names_what_to_install(bare: Path, wire: Wire) 
 def test_pytest_finds_the_fixtures_by_the_entry_point(full: Path, tmp_path: Path) -> None:
     test = tmp_path / "test_mine.py"
     test.write_text(
-        "def test_mine(wire, wait_for):\n    bus = wire.bus('me', lasting=True)\n    wait_for(bus.graph().endpoints)\n"
+        "def test_mine(wire, wait_for):\n    bus = wire.bus('me', lasting=True)\n    "
+        "wait_for(bus.graph().endpoints)\n"
     )
-    helps = good(full / "bin" / "python", "-m", "pytest", "-q", "-p", "no:cacheprovider", test, cwd=tmp_path)
+    helps = good(
+        full / "bin" / "python", "-m", "pytest", "-q", "-p", "no:cacheprovider", test, cwd=tmp_path
+    )
     assert "1 passed" in helps

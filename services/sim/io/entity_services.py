@@ -26,19 +26,24 @@ from holozen.messages import simulation_interfaces as si
 from holozen.messages.message import not_finite
 from holozen.messages.simulation_interfaces import Result
 from holozen.messages.simulation_interfaces import SpawnEntityReply as Spawn
-from holozen.robot.description import written
 from holozen.robot.errors import RobotError
-from holozen.robot.loading import received
+from holozen.robot.files.description import written
+from holozen.robot.files.loading import received
+from holozen.robot.files.xacro import uses_xacro
 from holozen.robot.model import RobotModel
-from holozen.robot.xacro import uses_xacro
 from holozen.rotation import XYZ, Transform
 from holozen.transport.services import answer_in_turn
 
-from ..entities import Entities, Entity, EntityError, Place, checked_place
+from ..entities import Entities
+from ..entity import Entity
+from ..errors import EntityError
+from ..physics.body import Placement
+from ..placement import checked_place
 from ..shard import Share
 
 MAX_SPEED = 100.0  # m/s and rad/s, of a state to set
-MAX_SPAWNS = 64  # waiting requests; each takes some 20 ms, and the last one is to be answered within a caller's 5 s
+# waiting requests; each takes some 20 ms, and the last one is to be answered within a caller's 5 s
+MAX_SPAWNS = 64
 REUSED = 2.0  # s for which a model with mesh files is reused; after that its files are read again
 MAX_PARSED = 8  # texts whose models are kept, for a fleet, or a robot that is spawned again
 MAX_WARNINGS = 20  # about a robot's text in a reply
@@ -48,11 +53,11 @@ _OK = Result(Result.OK)
 
 
 class EntityServices:
-    """Answers requests about entities. `packages` are those of `--package`: the only folders from which meshes are
-    read.
+    """Answers requests about entities. `packages` are those of `--package`: the only folders from
+    which meshes are read.
 
-    Of several sims on one wire only the first one `spawns`; shards spawn each its `share`. Each sim answers for its own
-    entities.
+    Of several sims on one wire only the first one `spawns`; shards spawn each its `share`. Each sim
+    answers for its own entities.
     """
 
     def __init__(
@@ -64,7 +69,8 @@ class EntityServices:
         share: Share | None = None,
     ) -> None:
         self._entities, self._packages, self._share = entities, packages, share
-        self._parsed: dict[bytes, tuple[RobotModel, float]] = {}  # by hash; until when (s) a model may be reused
+        # by hash; until when (s) a model may be reused
+        self._parsed: dict[bytes, tuple[RobotModel, float]] = {}
         serve = partial(bus.serve, shared=share is not None)
         self._servers = [
             serve("delete_entity", si.DeleteEntityRequest, si.DeleteEntityReply, self.delete),
@@ -74,15 +80,23 @@ class EntityServices:
             serve("get_scene", GetSceneRequest, GetSceneReply, self.scene),
         ]
         # From a thread of its own: a text with large meshes takes longer than a step.
-        serve("robot_description", RobotDescriptionRequest, RobotDescriptionReply, self.description).start()
+        serve(
+            "robot_description", RobotDescriptionRequest, RobotDescriptionReply, self.description
+        ).start()
         if spawns:
             self._servers.append(
-                serve("spawn_entity", si.SpawnEntityRequest, si.SpawnEntityReply, self.spawn, room=MAX_SPAWNS)
+                serve(
+                    "spawn_entity",
+                    si.SpawnEntityRequest,
+                    si.SpawnEntityReply,
+                    self.spawn,
+                    room=MAX_SPAWNS,
+                )
             )
 
     def answer(self) -> bool:
-        """Answer waiting requests for a short time, since many at once must not stall the steps. Returns whether it
-        answered any.
+        """Answer waiting requests for a short time, since many at once must not stall the steps.
+        Returns whether it answered any.
         """
         return answer_in_turn(self._servers)
 
@@ -104,38 +118,54 @@ class EntityServices:
         return si.SpawnEntityReply(Result(Result.OK, _warned(model.warnings)), entity.name)
 
     def _named(self, name: str) -> Entity:
-        """An entity of this sim. Each shard has all objects of the world file, and of the rest only its own."""
-        if not self._entities.has(name):
+        """An entity of this sim. Each shard has all objects of the world file, and of the rest only
+        its own.
+        """
+        if name not in self._entities:
             self._check_share(name)
         return self._entities.named(name)
 
     def _check_share(self, name: str) -> None:
-        """Raise Elsewhere if the name belongs to another shard, and EntityError if that one does not run."""
+        """Raise Elsewhere if the name belongs to another shard, and EntityError if that one does
+        not run.
+        """
         if self._share and (problem := self._share.refusal(name)):
             raise EntityError(Result.OPERATION_FAILED, problem)
 
     def _read(self, request: si.SpawnEntityRequest) -> RobotModel:
-        """The model in a request. No expression in it is evaluated, and only files of known packages are opened."""
+        """The model in a request. No expression in it is evaluated, and only files of known
+        packages are opened.
+        """
         text, now = request.resource_string, time.monotonic()
         key = hashlib.sha256(text.encode()).digest()
         model, until = self._parsed.get(key, (None, 0.0))
         if model and now < until:
             return model
         if not text:
-            problem = "resource_string is empty; it holds the URDF or SDF text, as `holozen spawn FILE` sends it"
-            raise EntityError(Spawn.UNSUPPORTED_ASSETS if request.uri else Spawn.NO_RESOURCE, problem)
+            problem = (
+                "resource_string is empty; it holds the URDF or SDF text, as `holozen spawn "
+                "FILE` sends it"
+            )
+            raise EntityError(
+                Spawn.UNSUPPORTED_ASSETS if request.uri else Spawn.NO_RESOURCE, problem
+            )
         if text.count("<") > MAX_TAGS:
-            problem = f"resource_string has more than {MAX_TAGS // 2} elements; a robot may have no more"
+            problem = (
+                f"resource_string has more than {MAX_TAGS // 2} elements; a robot may have no more"
+            )
             raise EntityError(Spawn.RESOURCE_PARSE_ERROR, problem)
         if uses_xacro(text):
             raise EntityError(
-                Spawn.UNSUPPORTED_FORMAT, "resource_string is xacro; expand it first: `holozen xacro FILE`"
+                Spawn.UNSUPPORTED_FORMAT,
+                "resource_string is xacro; expand it first: `holozen xacro FILE`",
             )
         try:
             model = received(text, self._packages)
         except RobotError as error:
             raise EntityError(Spawn.RESOURCE_PARSE_ERROR, str(error)) from None
-        shapes = (shape for link in model.links.values() for shape in (*link.collisions, *link.visuals))
+        shapes = (
+            shape for link in model.links.values() for shape in (*link.collisions, *link.visuals)
+        )
         lasting = not model.warnings and not any(shape.path for shape in shapes)
         self._parsed = dict([*self._parsed.items()][1 - MAX_PARSED :])
         self._parsed[key] = model, math.inf if lasting else time.monotonic() + REUSED
@@ -152,9 +182,13 @@ class EntityServices:
         """The names that match the filter."""
         filters = request.filters
         if filters.categories or filters.tags.tags or filters.bounds.type:
-            raise EntityError(Result.FEATURE_UNSUPPORTED, "entities are filtered by name only: filters.filter")
+            raise EntityError(
+                Result.FEATURE_UNSUPPORTED, "entities are filtered by name only: filters.filter"
+            )
         if len(filters.filter) > 100:
-            raise EntityError(Result.OPERATION_FAILED, "filters.filter is longer than 100 characters")
+            raise EntityError(
+                Result.OPERATION_FAILED, "filters.filter is longer than 100 characters"
+            )
         names = [entity.name for entity in self._entities]
         return si.GetEntitiesReply(_OK, entities=_matching(names, filters.filter))
 
@@ -163,7 +197,9 @@ class EntityServices:
         body = self._named(request.entity).body
         linear, angular = body.twist()
         header = Header(Time.of(self._entities.time), "world")
-        state = si.EntityState(header, Pose.of(*body.pose()), Twist(Vector3(*linear), Vector3(*angular)))
+        state = si.EntityState(
+            header, Pose.of(*body.pose()), Twist(Vector3(*linear), Vector3(*angular))
+        )
         return si.GetEntityStateReply(_OK, state=state)
 
     def scene(self, request: GetSceneRequest) -> GetSceneReply:
@@ -173,7 +209,7 @@ class EntityServices:
     def description(self, request: RobotDescriptionRequest) -> RobotDescriptionReply:
         """The URDF of an entity."""
         entity = self._named(request.name)
-        joints = entity.robot.joint_names if entity.robot else []
+        joints = entity.robot.telemetry.joint_names if entity.robot else []
         return RobotDescriptionReply(written(entity.model), entity.number, joints)
 
     def put(self, request: si.SetEntityStateRequest) -> si.SetEntityStateReply:
@@ -183,31 +219,44 @@ class EntityServices:
         linear, angular = _vector(state.twist.linear), _vector(state.twist.angular)
         if not_finite(state.twist) or max(map(abs, (*linear, *angular))) > MAX_SPEED:
             raise EntityError(
-                Result.OPERATION_FAILED, f"twist {linear}, {angular}: use at most {MAX_SPEED:g} m/s and rad/s"
+                Result.OPERATION_FAILED,
+                f"twist {linear}, {angular}: use at most {MAX_SPEED:g} m/s and rad/s",
             )
         if entity.model.static and any((*linear, *angular)):
-            raise EntityError(Result.OPERATION_FAILED, f"{request.entity!r} is static; its velocity cannot be set")
+            raise EntityError(
+                Result.OPERATION_FAILED, f"{request.entity!r} is static; its velocity cannot be set"
+            )
         self._entities.put(entity.name, place, linear, angular)
         return si.SetEntityStateReply(_OK)
 
 
 def _seen(entity: Entity, without_joints: bool) -> SceneEntity:
     robot = entity.robot
-    command, odometry = robot.keys if robot else ("", "")
-    joints = robot.joint_positions if robot and not without_joints else []
-    return SceneEntity(entity.name, entity.number, command, odometry, Pose.of(*entity.body.pose()), joints)
+    command = entity.identity.command_key if robot else ""
+    odometry = (robot and entity.identity.odometry_key) or ""
+    joints = robot.actuators.mover.states()[0] if robot and not without_joints else []
+    return SceneEntity(
+        entity.name, entity.number, command, odometry, Pose.of(*entity.body.pose()), joints
+    )
 
 
 def _warned(warnings: tuple[str, ...]) -> str:
-    more = [f"and {len(warnings) - MAX_WARNINGS} more warnings"] if len(warnings) > MAX_WARNINGS else []
+    more = (
+        [f"and {len(warnings) - MAX_WARNINGS} more warnings"]
+        if len(warnings) > MAX_WARNINGS
+        else []
+    )
     return "\n".join(" ".join(warning.split()) for warning in [*warnings[:MAX_WARNINGS], *more])
 
 
 def _matching(names: list[str], wanted: str) -> list[str]:
-    """The names that a pattern matches. Only `*`, `.`, `|`, `^`, `$` are special: with others a match may never end."""
+    """The names that a pattern matches. Only `*`, `.`, `|`, `^`, `$` are special: with others a
+    match may never end.
+    """
     if not re.fullmatch(r"[\w.*|^$-]*", wanted) or "**" in wanted or wanted.count("*") > 3:
         raise EntityError(
-            Result.FEATURE_UNSUPPORTED, f"filter {wanted!r}: use letters, digits, '_', '-', '.', '*', '|', '^', '$'"
+            Result.FEATURE_UNSUPPORTED,
+            f"filter {wanted!r}: use letters, digits, '_', '-', '.', '*', '|', '^', '$'",
         )
     try:
         pattern = re.compile(wanted)
@@ -216,9 +265,12 @@ def _matching(names: list[str], wanted: str) -> list[str]:
     return [name for name in names if pattern.search(name)]
 
 
-def _place(header: Header, pose: Pose) -> Place:
+def _place(header: Header, pose: Pose) -> Placement:
     if header.frame_id not in WORLD:
-        raise EntityError(Spawn.INVALID_POSE, f"frame {header.frame_id[:80]!r}: give the pose in the frame 'world'")
+        raise EntityError(
+            Spawn.INVALID_POSE,
+            f"frame {header.frame_id[:80]!r}: give the pose in the frame 'world'",
+        )
     place = Transform.of(pose.position, pose.orientation)
     return checked_place(place.translation, place.rotation)
 

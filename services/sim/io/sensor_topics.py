@@ -3,12 +3,13 @@
 import math
 import zlib
 from array import array
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from holozen.bus import Bus
+from holozen.command.collision_monitor import CollisionMonitor
 from holozen.messages import (
     ContactsState,
     ContactState,
@@ -26,20 +27,18 @@ from holozen.messages import (
     Vector3,
 )
 from holozen.messages import Imu as ImuMessage
-from holozen.robot.model import Bumper, Camera, Imu, Lidar, Noise, Sensor, WorldSpec
-from holozen.robot.sensors import WORLD
+from holozen.robot.files.sensors import WORLD
+from holozen.robot.model import Bumper, Camera, Imu, Lidar, Noise, Sensor, WorldSpec, is_watched
 from holozen.rotation import XYZ, conjugate, rotate
 from holozen.transport.pubsub import Publisher
 from holozen.wire import key_for
 
 from ..cameras import Cameras
-from ..link_states import LinkState, placed
+from ..identity import Identity
+from ..link_states import LinkState, LinkStates, placed
 from ..physics.engine import Array
 from ..physics.ray_caster import RayCaster
 from ..schedule import Schedule
-
-LinkStates = Mapping[str, LinkState]
-"""The states of a robot's links, by name."""
 
 
 class Step(NamedTuple):
@@ -50,8 +49,8 @@ class Step(NamedTuple):
 
 
 class Surroundings(NamedTuple):
-    """What the sensors of a world share: `look` gives what rays hit and `seen` what cameras see at present, `seed` is
-    that of all noise, and `cameras` is the process that renders.
+    """What the sensors of a world share: `look` gives what rays hit and `seen` what cameras see at
+    present, `seed` is that of all noise, and `cameras` is the process that renders.
     """
 
     world: WorldSpec
@@ -62,41 +61,58 @@ class Surroundings(NamedTuple):
 
 
 class SensorTopics:
-    """All sensors of the robot `name`, whose keys and frames begin with `prefix`. `phase` is that of a Schedule."""
+    """All sensors of one robot. `phase` is that of a Schedule, `monitor` what drives by them."""
 
     def __init__(
-        self, bus: Bus, name: str, prefix: str, sensors: Iterable[Sensor], around: Surroundings, phase: float
+        self,
+        bus: Bus,
+        identity: Identity,
+        around: Surroundings,
+        phase: float,
+        monitor: CollisionMonitor | None = None,
     ) -> None:
         self._phase = phase
         self._all: list[tuple[SensorTopic, Schedule]] = []
-        for sensor in sensors:
+        name, prefix = identity.name, identity.prefix
+        for sensor in identity.model.sensors:
             draw = Draw(around.seed, f"{name}/{sensor.name}")
             match sensor.device:
                 case Lidar():
-                    self._add(LidarTopic(bus, name, prefix, sensor, sensor.device, around, draw))
+                    watching = monitor if is_watched(sensor) else None
+                    self._add(
+                        LidarTopic(bus, name, prefix, sensor, sensor.device, around, draw, watching)
+                    )
                 case Imu():
                     self._add(ImuTopic(bus, prefix, sensor, sensor.device, around, draw))
                 case Bumper():
                     self._add(BumperTopic(bus, name, prefix, sensor, around))
                 case Camera() if around.cameras:
                     self._add(CameraTopic(prefix, sensor, sensor.device, around, around.cameras))
-        self.next = -math.inf  # s of sim time; `publish` has nothing to do before
+
+    @property
+    def next(self) -> float:
+        """The sim time (s) until which nothing is due."""
+        return min((schedule.next for _, schedule in self._all), default=math.inf)
 
     def _add(self, topic: "SensorTopic") -> None:
         self._all.append((topic, Schedule(topic.sensor.rate, self._phase)))
 
     def publish(self, step: Step, links: Callable[[], LinkStates]) -> None:
         """Publish the sensors that are due and wanted."""
-        due = [topic for topic, schedule in self._all if schedule.due(step.time) and topic.wanted]
-        self.next = min((schedule.next for _, schedule in self._all), default=math.inf)
+        due = [
+            topic
+            for topic, schedule in self._all
+            if schedule.advance(step.time) and topic.poll_wanted()
+        ]
         if due:
             now = links()
             for topic in due:
                 topic.publish(step, now)
 
     def reset(self) -> None:
-        """The world was reset: forget all earlier measurements, and let all sensors be due at once."""
-        self.next = -math.inf
+        """The world was reset: forget all earlier measurements, and let all sensors be due at
+        once.
+        """
         for topic, schedule in self._all:
             schedule.set_rate(schedule.rate)
             topic.reset()
@@ -108,7 +124,9 @@ class SensorTopics:
 
 
 class Draw:
-    """Random numbers of a sensor. They depend on the seed and the step alone, and not on what was drawn before."""
+    """Random numbers of a sensor. They depend on the seed and the step alone, and not on what was
+    drawn before.
+    """
 
     def __init__(self, seed: int, sensor: str) -> None:
         self._seed = seed, zlib.crc32(sensor.encode())
@@ -116,21 +134,26 @@ class Draw:
     def noise(self, steps: int, noises: Iterable[Noise], count: int = 1) -> Array:
         """The noise (n, count) of n quantities at the step number `steps`."""
         random = np.random.default_rng((*self._seed, steps))
-        return np.array([noise.mean + noise.stddev * random.standard_normal(count) for noise in noises])
+        return np.array(
+            [noise.mean + noise.stddev * random.standard_normal(count) for noise in noises]
+        )
 
 
 class SensorTopic:
-    """A sensor of a robot with this `prefix`, and its publisher; None if another process publishes for it."""
+    """A sensor of a robot with this `prefix`, and its publisher; None if another process publishes
+    for it.
+    """
 
-    def __init__(self, sensor: Sensor, prefix: str, around: Surroundings, publisher: Publisher[Any] | None) -> None:
+    def __init__(
+        self, sensor: Sensor, prefix: str, around: Surroundings, publisher: Publisher[Any] | None
+    ) -> None:
         self.sensor, self._around, self._publisher = sensor, around, publisher
         self._frame = key_for(sensor.frame, prefix)
         self._xyz, self._rotation = placed(sensor.pose)
 
-    @property
-    def wanted(self) -> bool:
+    def poll_wanted(self) -> bool:
         """Whether anyone wants what `publish` sends."""
-        return self._publisher is not None and self._publisher.wanted
+        return self._publisher is not None and self._publisher.poll_wanted()
 
     def publish(self, step: Step, links: LinkStates) -> None:
         """Publish what the sensor measures after a step."""
@@ -157,25 +180,62 @@ class LidarTopic(SensorTopic):
     """A lidar, which publishes a scan or points; or a distance sensor."""
 
     def __init__(
-        self, bus: Bus, name: str, prefix: str, sensor: Sensor, lidar: Lidar, around: Surroundings, draw: Draw
+        self,
+        bus: Bus,
+        name: str,
+        prefix: str,
+        sensor: Sensor,
+        lidar: Lidar,
+        around: Surroundings,
+        draw: Draw,
+        monitor: CollisionMonitor | None = None,
     ) -> None:
+        """`monitor` drives by what it measures."""
+        self._monitor, self._key = monitor, key_for(sensor.topic, prefix)
         kind, self._message = MESSAGES[lidar.message]
         super().__init__(sensor, prefix, around, bus.publisher(key_for(sensor.topic, prefix), kind))
-        self._lidar, self._draw, self._own, self._directions = lidar, draw, (name, sensor.link), directions(lidar)
+        self._lidar, self._draw, self._own, self._directions = (
+            lidar,
+            draw,
+            (name, sensor.link),
+            directions(lidar),
+        )
+
+    def poll_wanted(self) -> bool:
+        """Whether anyone wants what it measures."""
+        return super().poll_wanted() or (self._monitor is not None and self._monitor.seconds > 0)
+
+    def publish(self, step: Step, links: LinkStates) -> None:
+        """Measure, and publish it if anyone wants it."""
+        measured = self._measured(step, links)
+        if self._monitor and isinstance(measured, LaserScan | Range):
+            self._monitor.see(self._key, measured)
+        if self._publisher and super().poll_wanted():
+            self._publisher.put(measured)
 
     def _measured(self, step: Step, links: LinkStates) -> Message:
         lidar, at = self._lidar, self._at(links)
-        ranges = self._around.look().ranges(at.xyz, at.rotation, self._directions, lidar.near, lidar.far, self._own)
+        ranges = self._around.look().ranges(
+            at.xyz, at.rotation, self._directions, lidar.near, lidar.far, self._own
+        )
         if lidar.noise.mean or lidar.noise.stddev:
             noise = self._draw.noise(step.number, [lidar.noise], len(ranges))[0]
-            ranges = np.where(np.isfinite(ranges), np.clip(ranges + noise, lidar.near, lidar.far), ranges)
-        return self._message(Header(Time.of(step.time), self._frame), self.sensor, lidar, self._directions, ranges)
+            ranges = np.where(
+                np.isfinite(ranges), np.clip(ranges + noise, lidar.near, lidar.far), ranges
+            )
+        return self._message(
+            Header(Time.of(step.time), self._frame), self.sensor, lidar, self._directions, ranges
+        )
 
 
 def directions(lidar: Lidar) -> Array:
-    """The unit vectors (n, 3) of its rays: row by row from the lowest one, each row counter-clockwise."""
+    """The unit vectors (n, 3) of its rays: row by row from the lowest one, each row
+    counter-clockwise.
+    """
     fans = (lidar.vertical, lidar.horizontal)
-    up, left = np.meshgrid(*(np.linspace(fan.first, fan.last, fan.count) for fan in fans), indexing="ij")
+    up, left = np.meshgrid(
+        *(np.linspace(fan.first, fan.last, fan.count) for fan in fans), indexing="ij"
+    )
     rays = np.stack([np.cos(up) * np.cos(left), np.cos(up) * np.sin(left), np.sin(up)], axis=-1)
     return rays.reshape(-1, 3)
 
@@ -186,12 +246,17 @@ def _scan(header: Header, sensor: Sensor, lidar: Lidar, _rays: Array, ranges: Ar
     row = ranges.reshape(lidar.vertical.count, fan.count)[lidar.vertical.count // 2]
     values = array("f")
     values.frombytes(row.astype(np.float32).tobytes())
-    return LaserScan(header, fan.first, fan.last, fan.step, 0.0, 1 / sensor.rate, lidar.near, lidar.far, values)
+    return LaserScan(
+        header, fan.first, fan.last, fan.step, 0.0, 1 / sensor.rate, lidar.near, lidar.far, values
+    )
 
 
 def _nearest(header: Header, _sensor: Sensor, lidar: Lidar, _rays: Array, ranges: Array) -> Range:
     """The shortest range."""
-    kind, width = Range.INFRARED if lidar.infrared else Range.ULTRASOUND, lidar.horizontal.last - lidar.horizontal.first
+    kind, width = (
+        Range.INFRARED if lidar.infrared else Range.ULTRASOUND,
+        lidar.horizontal.last - lidar.horizontal.first,
+    )
     return Range(header, kind, width, lidar.near, lidar.far, float(ranges.min()))
 
 
@@ -199,39 +264,50 @@ FIELDS = [PointField(name, 4 * place, PointField.FLOAT32, 1) for place, name in 
 POINT = 12  # bytes
 
 
-def _points(header: Header, _sensor: Sensor, _lidar: Lidar, rays: Array, ranges: Array) -> PointCloud2:
+def _points(
+    header: Header, _sensor: Sensor, _lidar: Lidar, rays: Array, ranges: Array
+) -> PointCloud2:
     """The points that the rays hit, in one row."""
     hit = np.isfinite(ranges)
     points = (rays[hit] * ranges[hit, None]).astype("<f4")
     size = POINT * len(points)
-    return PointCloud2(header, 1, len(points), FIELDS, False, POINT, size, array("B", points.tobytes()), True)
+    return PointCloud2(
+        header, 1, len(points), FIELDS, False, POINT, size, array("B", points.tobytes()), True
+    )
 
 
-MESSAGES: dict[str, tuple[type[Message], Callable[[Header, Sensor, Lidar, Array, Array], Message]]] = {
+MESSAGES: dict[
+    str, tuple[type[Message], Callable[[Header, Sensor, Lidar, Array, Array], Message]]
+] = {
     "scan": (LaserScan, _scan),
     "points": (PointCloud2, _points),
     "range": (Range, _nearest),
 }
-"""The message types of a lidar, each with the function that makes one from its rays (n, 3) and ranges (n,)."""
+"""The message types of a lidar, each with the function that makes one from its rays (n, 3) and
+ranges (n,).
+"""
 
 
 class ImuTopic(SensorTopic):
     """An inertial measurement unit. Its acceleration is the mean since the previous measurement."""
 
-    def __init__(self, bus: Bus, prefix: str, sensor: Sensor, imu: Imu, around: Surroundings, draw: Draw) -> None:
-        super().__init__(sensor, prefix, around, bus.publisher(key_for(sensor.topic, prefix), ImuMessage))
+    def __init__(
+        self, bus: Bus, prefix: str, sensor: Sensor, imu: Imu, around: Surroundings, draw: Draw
+    ) -> None:
+        super().__init__(
+            sensor, prefix, around, bus.publisher(key_for(sensor.topic, prefix), ImuMessage)
+        )
         self._imu, self._draw, self._noises = imu, draw, (*imu.rate, *imu.acceleration)
         self._before: tuple[float, XYZ] | None = None  # s, and the velocity then
 
-    @property
-    def wanted(self) -> bool:
+    def poll_wanted(self) -> bool:
         """Always true: its measurements must not depend on who subscribes."""
         return True
 
     def publish(self, step: Step, links: LinkStates) -> None:
         """Measure, and publish it if anyone wants it."""
         self._now = self._at(links)
-        if super().wanted:
+        if super().poll_wanted():
             super().publish(step, links)
         self._before = step.time, self._now.linear
 
@@ -240,20 +316,28 @@ class ImuTopic(SensorTopic):
         changes = [0.0] * 3
         if before and step.time > before[0]:
             seconds = step.time - before[0]
-            changes = [(now - then) / seconds for now, then in zip(at.linear, before[1], strict=True)]
+            changes = [
+                (now - then) / seconds for now, then in zip(at.linear, before[1], strict=True)
+            ]
         back = conjugate(at.rotation)
-        ax, ay, az = (change - pull for change, pull in zip(changes, self._around.world.gravity, strict=True))
+        ax, ay, az = (
+            change - pull for change, pull in zip(changes, self._around.world.gravity, strict=True)
+        )
         turn, force = rotate(back, at.angular), rotate(back, (ax, ay, az))
         noise = self._draw.noise(step.number, self._noises)[:, 0]
-        values = [value + extra for value, extra in zip((*turn, *force), noise.tolist(), strict=True)]
+        values = [
+            value + extra for value, extra in zip((*turn, *force), noise.tolist(), strict=True)
+        ]
         oriented = self._imu.oriented
         return ImuMessage(
             Header(Time.of(step.time), self._frame),
             Quaternion(*at.rotation) if oriented else Quaternion(),
             [0.0 if oriented else -1.0, *[0.0] * 8],  # -1: not measured
-            Vector3(*values[:3]), _covariance(self._imu.rate), Vector3(*values[3:]),
+            Vector3(*values[:3]),
+            _covariance(self._imu.rate),
+            Vector3(*values[3:]),
             _covariance(self._imu.acceleration),
-        )  # fmt: skip
+        )
 
     def reset(self) -> None:
         """The world was reset: forget the last velocity."""
@@ -263,8 +347,12 @@ class ImuTopic(SensorTopic):
 class BumperTopic(SensorTopic):
     """A bumper: what touches its link. Forces are not measured."""
 
-    def __init__(self, bus: Bus, name: str, prefix: str, sensor: Sensor, around: Surroundings) -> None:
-        super().__init__(sensor, prefix, around, bus.publisher(key_for(sensor.topic, prefix), ContactsState))
+    def __init__(
+        self, bus: Bus, name: str, prefix: str, sensor: Sensor, around: Surroundings
+    ) -> None:
+        super().__init__(
+            sensor, prefix, around, bus.publisher(key_for(sensor.topic, prefix), ContactsState)
+        )
         self._own = (name, sensor.link)
         if sensor.frame == WORLD:
             self._frame = WORLD
@@ -273,13 +361,19 @@ class BumperTopic(SensorTopic):
         own = "::".join(self._own)
         states = [
             ContactState(
-                f"{len(touch.points)} contacts", own, "::".join(touch.other),
-                contact_positions=[Vector3(*self._in_frame(point, links, place=True)) for point in touch.points],
-                contact_normals=[Vector3(*self._in_frame(normal, links)) for normal in touch.normals],
+                f"{len(touch.points)} contacts",
+                own,
+                "::".join(touch.other),
+                contact_positions=[
+                    Vector3(*self._in_frame(point, links, place=True)) for point in touch.points
+                ],
+                contact_normals=[
+                    Vector3(*self._in_frame(normal, links)) for normal in touch.normals
+                ],
                 depths=touch.depths,
             )
             for touch in self._around.look().touches(*self._own)
-        ]  # fmt: skip
+        ]
         return ContactsState(Header(Time.of(step.time), self._frame), states)
 
     def _in_frame(self, vector: XYZ, links: LinkStates, place: bool = False) -> XYZ:
@@ -295,28 +389,41 @@ class BumperTopic(SensorTopic):
 class CameraTopic(SensorTopic):
     """A camera, whose pictures another process renders."""
 
-    def __init__(self, prefix: str, sensor: Sensor, camera: Camera, around: Surroundings, cameras: Cameras) -> None:
+    def __init__(
+        self, prefix: str, sensor: Sensor, camera: Camera, around: Surroundings, cameras: Cameras
+    ) -> None:
         super().__init__(sensor, prefix, around, None)
         self._camera, self._cameras = camera, cameras
         keys = (camera.image, camera.info, camera.depth)
         self._image, self._info, self._depth = (key and key_for(key, prefix) for key in keys)
 
-    @property
-    def wanted(self) -> bool:
+    def poll_wanted(self) -> bool:
         """Whether anyone wants what `publish` sends."""
-        return self._cameras.wanted
+        return self._cameras.poll_wanted()
 
     def publish(self, step: Step, links: LinkStates) -> None:
         """Send an exposure to the process that renders."""
         camera, around, at = self._camera, self._around, self._at(links)
         self._cameras.expose(
             Exposure(
-                Header(Time.of(step.time), self._frame), self._image, self._info, self._depth, camera.width,
-                camera.height, camera.field_of_view, camera.near, camera.far, camera.encoding, camera.noise.mean,
-                camera.noise.stddev, around.seed % 2**64, Pose.of(at.xyz, at.rotation), around.world.ground,
+                Header(Time.of(step.time), self._frame),
+                self._image,
+                self._info,
+                self._depth,
+                camera.width,
+                camera.height,
+                camera.field_of_view,
+                camera.near,
+                camera.far,
+                camera.encoding,
+                camera.noise.mean,
+                camera.noise.stddev,
+                around.seed % 2**64,
+                Pose.of(at.xyz, at.rotation),
+                around.world.ground,
                 around.seen(),
             )
-        )  # fmt: skip
+        )
 
     def close(self) -> None:
         """Have the keys closed by the process that publishes on them."""

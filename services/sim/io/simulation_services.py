@@ -1,4 +1,6 @@
-"""The services and the action of simulation_interfaces that play, pause, step and reset the simulation."""
+"""The services and the action of simulation_interfaces that play, pause, step and reset the
+simulation.
+"""
 
 import math
 import time
@@ -16,12 +18,14 @@ from holozen.transport.actions import State as GoalState
 from holozen.transport.errors import ServiceError
 from holozen.transport.services import answer_in_turn, refuse
 
-from ..entities import EntityError
+from ..errors import EntityError
 from ..simulation import NAMES, Simulation
 
 _OK = si.Result(si.Result.OK)
 FEEDBACK_EVERY = 0.1  # s
-OUTDATED = "this may have been sent before the sim was last paused; send it again if it is still to play"
+OUTDATED = (
+    "this may have been sent before the sim was last paused; send it again if it is still to play"
+)
 
 
 class SimulationServices:
@@ -29,19 +33,33 @@ class SimulationServices:
 
     def __init__(self, bus: Bus, simulation: Simulation, end: Callable[[], None]) -> None:
         self._simulation, self._end = simulation, end
-        self._steps = bus.serve("step_simulation", si.StepSimulationRequest, si.StepSimulationReply, _not_now)
+        self._steps = bus.serve(
+            "step_simulation", si.StepSimulationRequest, si.StepSimulationReply, _not_now
+        )
         self._setter = bus.serve(
-            "set_simulation_state", si.SetSimulationStateRequest, si.SetSimulationStateReply, self.set_state
+            "set_simulation_state",
+            si.SetSimulationStateRequest,
+            si.SetSimulationStateReply,
+            self.set_state,
         )
         self._servers = [
-            bus.serve("get_simulation_state", si.GetSimulationStateRequest, si.GetSimulationStateReply, self.state),
+            bus.serve(
+                "get_simulation_state",
+                si.GetSimulationStateRequest,
+                si.GetSimulationStateReply,
+                self.state,
+            ),
             self._setter,
-            bus.serve("reset_simulation", si.ResetSimulationRequest, si.ResetSimulationReply, self.reset),
+            bus.serve(
+                "reset_simulation", si.ResetSimulationRequest, si.ResetSimulationReply, self.reset
+            ),
         ]
-        self._action = ActionServer(bus, "simulate_steps", si.SimulateSteps, lambda _: "", self._begin)
+        self._action = ActionServer(
+            bus, "simulate_steps", si.SimulateSteps, lambda _: "", self._begin
+        )
         self._goal: Goal | None = None  # of the steps that are being made
         self._reported = -math.inf  # s; the last feedback
-        self._paused_at = -math.inf  # s; the last request to pause or stop
+        self._paused_at: float | None = None  # s; the last request to pause or stop
 
     def answer(self) -> bool:
         """Answer waiting requests for a short time. Returns whether it answered or began any."""
@@ -65,7 +83,7 @@ class SimulationServices:
         if wanted in (State.STATE_STOPPED, State.STATE_PAUSED):
             self._paused_at = now
         elif wanted == State.STATE_PLAYING and self._simulation.is_paused:
-            self._setter.require_sent_after(self._paused_at, now, OUTDATED)
+            self._setter.require_sent_after(self._paused_at, OUTDATED)
         if wanted == State.STATE_QUITTING:
             self._end()
         elif wanted not in NAMES:
@@ -73,7 +91,9 @@ class SimulationServices:
             raise EntityError(si.Result.FEATURE_UNSUPPORTED, problem)
         elif wanted == self._simulation.state and not self._simulation.steps:
             problem = f"the sim is {NAMES[wanted]} already"
-            return si.SetSimulationStateReply(si.Result(si.SetSimulationStateReply.ALREADY_IN_TARGET_STATE, problem))
+            return si.SetSimulationStateReply(
+                si.Result(si.SetSimulationStateReply.ALREADY_IN_TARGET_STATE, problem)
+            )
         else:
             {
                 State.STATE_STOPPED: self._simulation.stop,
@@ -107,7 +127,9 @@ class SimulationServices:
                 raise EntityError(si.Result.INCORRECT_STATE, "other steps are being made")
             self._simulation.step(goal.request.steps, partial(self._ended, goal))
         except EntityError as error:
-            self._action.finish(goal, GoalState.ABORTED, si.SimulateStepsResult(si.Result(error.code, str(error))))
+            self._action.finish(
+                goal, GoalState.ABORTED, si.SimulateStepsResult(si.Result(error.code, str(error)))
+            )
             return
         self._goal = goal
         self._action.move(goal, GoalState.EXECUTING)
@@ -124,7 +146,9 @@ class SimulationServices:
             self._action.finish(goal, GoalState.SUCCEEDED, si.SimulateStepsResult(_OK))
             return
         state = GoalState.CANCELED if goal.state is GoalState.CANCELING else GoalState.ABORTED
-        self._action.finish(goal, state, si.SimulateStepsResult(si.Result(si.Result.OPERATION_FAILED, reason)))
+        self._action.finish(
+            goal, state, si.SimulateStepsResult(si.Result(si.Result.OPERATION_FAILED, reason))
+        )
 
     def _stepped(self, query: Any, reason: str) -> None:
         with query:

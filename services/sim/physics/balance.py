@@ -7,9 +7,8 @@ from msgspec import Struct
 
 from holozen.limits import Planar, clamp
 from holozen.robot.errors import RobotError
-from holozen.robot.gazebo_plugins import round_radius
 from holozen.robot.model import Balancing, RobotModel
-from holozen.robot.rigid import assemble, joint_axes
+from holozen.robot.rigid import assemble, joint_axes, round_radius
 from holozen.robot.rotation import Array
 from holozen.rotation import rotate
 from holozen.rotation import yaw as yaw_of
@@ -19,15 +18,17 @@ from .jointed import JointedBody, JointedMover
 from .wheels import forward_sign
 
 LEAN, LEAN_RATE, SPEED, DISTANCE, EFFORT = 0.2, 1.0, 0.1, 0.1, 0.1
-"""The largest acceptable deviations in rad, rad/s, m/s, m and N m; the weights are their inverse squares (Bryson)."""
+"""The largest acceptable deviations in rad, rad/s, m/s, m and N m; the weights are their inverse
+squares (Bryson).
+"""
 
 Gains = tuple[float, float, float, float]
 
 
 class Pendulum(Struct, frozen=True):
-    """A body on wheels, in SI units: the masses of the body and of all wheels, the wheels' radius, the height of the
-    body's centre of mass above the axle, the height of the axle in the root frame, and the inertias of the body and of
-    all wheels about the direction of the axle.
+    """A body on wheels, in SI units: the masses of the body and of all wheels, the wheels' radius,
+    the height of the body's centre of mass above the axle, the height of the axle in the root
+    frame, and the inertias of the body and of all wheels about the direction of the axle.
     """
 
     body_mass: float
@@ -41,7 +42,10 @@ class Pendulum(Struct, frozen=True):
     @property
     def inertia(self) -> Array:
         """The mass matrix (2, 2) for (distance, lean) of the upright body."""
-        along, mixed = self.body_mass + self.wheel_mass + self.wheel_inertia / self.radius**2, self._moment
+        along, mixed = (
+            self.body_mass + self.wheel_mass + self.wheel_inertia / self.radius**2,
+            self._moment,
+        )
         return np.array([[along, mixed], [mixed, self.body_inertia + mixed * self.height]])
 
     @property
@@ -52,7 +56,9 @@ class Pendulum(Struct, frozen=True):
 
     @property
     def lag(self) -> float:
-        """The distance in m, per rad of lean, of the axle behind the point whose acceleration is that of the lean."""
+        """The distance in m, per rad of lean, of the axle behind the point whose acceleration is
+        that of the lean.
+        """
         (along, mixed), (_, about) = self.inertia
         return float((self.radius * mixed + about) / (self.radius * along + mixed))
 
@@ -62,11 +68,14 @@ class Pendulum(Struct, frozen=True):
 
 
 def gains(pendulum: Pendulum, dt: float) -> Gains:
-    """The torque in N m on the wheels per rad of lean, rad/s of lean rate, m/s of speed error and m of distance error.
+    """The torque in N m on the wheels per rad of lean, rad/s of lean rate, m/s of speed error and m
+    of distance error.
 
-    They are those of a linear quadratic regulator for the pendulum, linearised upright, in steps of `dt` seconds.
-    Source of the model: Kim, Kim and Kwak, "Dynamic analysis of a nonholonomic two-wheeled inverted pendulum robot", J.
-    Intell. Robot. Syst. 44, 2005; of the iteration: Anderson and Moore, Optimal Control, 1990, section 2.4.
+    They are those of a linear quadratic regulator for the pendulum, linearised upright, in steps of
+    `dt` seconds.
+    Source of the model: Kim, Kim and Kwak, "Dynamic analysis of a nonholonomic two-wheeled inverted
+    pendulum robot", J. Intell. Robot. Syst. 44, 2005; of the iteration: Anderson and Moore, Optimal
+    Control, 1990, section 2.4.
     """
     step, push = _motion(pendulum, dt)
     weights = np.diag([1 / LEAN**2, 1 / LEAN_RATE**2, 1 / SPEED**2, 1 / DISTANCE**2])
@@ -82,8 +91,8 @@ def gains(pendulum: Pendulum, dt: float) -> Gains:
 
 
 def _motion(p: Pendulum, dt: float) -> tuple[Array, Array]:
-    """The discrete state space of (lean, lean rate, speed, distance): the matrices (4, 4) of the state, and (4, 1) of a
-    torque that drives the wheels forward.
+    """The discrete state space of (lean, lean rate, speed, distance): the matrices (4, 4) of the
+    state, and (4, 1) of a torque that drives the wheels forward.
     """
     falling = np.linalg.solve(p.inertia, [0.0, p.body_mass * GRAVITY * p.height])
     pushed = np.linalg.solve(p.inertia, [1 / p.radius, -1.0])
@@ -113,7 +122,9 @@ class VelocityProfile:
         self.speed += self.acceleration * dt
 
     def follow(self, speed: float, tolerance: float) -> None:
-        """Move the profile to within `tolerance` (m/s) of the true `speed`, for a robot that was pushed."""
+        """Move the profile to within `tolerance` (m/s) of the true `speed`, for a robot that was
+        pushed.
+        """
         self.speed = speed + clamp(self.speed - speed, tolerance)
 
 
@@ -132,9 +143,13 @@ YAW_TIME = 0.3  # s; time constant in which a heading error is corrected
 
 
 class BalanceMover(JointedMover):
-    """A body on two wheels. It leans to speed up and to slow down, so a stop takes some tenths of a second."""
+    """A body on two wheels. It leans to speed up and to slow down, so a stop takes some tenths of a
+    second.
+    """
 
-    def __init__(self, body: JointedBody, model: RobotModel, mechanism: Balancing, dt: float) -> None:
+    def __init__(
+        self, body: JointedBody, model: RobotModel, mechanism: Balancing, dt: float
+    ) -> None:
         self._sides = (mechanism.left, mechanism.right)
         super().__init__(body, reserved=frozenset(self._sides))
         self._signs = [forward_sign(model, name) for name in self._sides]
@@ -144,7 +159,8 @@ class BalanceMover(JointedMover):
         self._max_acceleration = MAX_LEAN / self._pendulum.lean_per_acceleration
         self._rest()
         for name in self._sides:
-            body.release(name, friction=0.0)  # Gazebo's plugin sets it to zero, whatever the file has
+            # Gazebo's plugin sets it to zero, whatever the file has
+            body.release(name, friction=0.0)
 
     def _rest(self) -> None:
         self._profile = VelocityProfile(self._max_acceleration)
@@ -165,8 +181,8 @@ class BalanceMover(JointedMover):
         slow = self._turn - turning
         self._behind = clamp(self._behind + slow * dt, ASTRAY)
         if not (x or turn or self._turn) and abs(self._profile.speed) < STILL:
-            # At a stop it forgets its heading error, and a small position error: else it would oscillate for ever, as
-            # its wheels stick and slip.
+            # At a stop it forgets its heading error, and a small position error: else it would
+            # oscillate for ever, as its wheels stick and slip.
             self._behind = 0.0
             if abs(self._ahead) < NEAR:
                 self._ahead *= 1 - dt / FORGETS
@@ -176,16 +192,29 @@ class BalanceMover(JointedMover):
         return self._push(drive - steer, drive + steer)
 
     def _effort(self, state: tuple[float, float, float], dt: float) -> float:
-        """The torque (N m) of both wheels together: feedforward of the profile, and feedback of the errors."""
-        profile, pendulum, leaning = self._profile, self._pendulum, self._pendulum.lean_per_acceleration
+        """The torque (N m) of both wheels together: feedforward of the profile, and feedback of the
+        errors.
+        """
+        profile, pendulum, leaning = (
+            self._profile,
+            self._pendulum,
+            self._pendulum.lean_per_acceleration,
+        )
         lean, rate, speed = state
         bend = leaning * profile.snap  # the lean's second derivative
         fast = speed - (profile.speed - pendulum.lag * leaning * profile.jerk)
         self._ahead = clamp(self._ahead + fast * dt, MAX_AHEAD)
-        errors = (lean - leaning * profile.acceleration, rate - leaning * profile.jerk, fast, self._ahead)
+        errors = (
+            lean - leaning * profile.acceleration,
+            rate - leaning * profile.jerk,
+            fast,
+            self._ahead,
+        )
         feedback = sum(gain * error for gain, error in zip(self._gains, errors, strict=True))
         along, mixed = pendulum.inertia[0]
-        feedforward = pendulum.radius * float(along * (profile.acceleration - pendulum.lag * bend) + mixed * bend)
+        feedforward = pendulum.radius * float(
+            along * (profile.acceleration - pendulum.lag * bend) + mixed * bend
+        )
         return feedforward - feedback
 
     def _push(self, left: float, right: float) -> None:
@@ -193,7 +222,9 @@ class BalanceMover(JointedMover):
             self.body.push(name, sign * effort)
 
     def _state(self) -> tuple[float, float, float, float]:
-        """Lean (rad, forward), its rate, the axle's speed forward (m/s) and the turn rate (rad/s)."""
+        """Lean (rad, forward), its rate, the axle's speed forward (m/s) and the turn rate
+        (rad/s).
+        """
         _, rotation = self.body.pose()
         linear, angular = self.body.twist()
         yaw = yaw_of(rotation)
@@ -214,7 +245,8 @@ def pendulum_of(model: RobotModel, wheels: tuple[str, str]) -> Pendulum:
     radius = round_radius(model.links[model.joints[wheels[0]].child])
     if len(turning) != 2 or not radius or body.centre[2] <= axle:
         raise RobotError(
-            f"{model.name!r} cannot balance on {' and '.join(wheels)}: it needs two round wheels with mass,"
+            f"{model.name!r} cannot balance on {' and '.join(wheels)}: it needs two round wheels "
+            "with mass,"
             " and a body whose centre of mass is above their axle"
         )
     return Pendulum(
@@ -228,8 +260,12 @@ def pendulum_of(model: RobotModel, wheels: tuple[str, str]) -> Pendulum:
     )
 
 
-def _strengths(model: RobotModel, wheels: tuple[str, str], pendulum: Pendulum) -> tuple[float, float]:
-    """The largest torque (N m) at which a wheel does not slip, and the gain from a turn rate error to torque."""
+def _strengths(
+    model: RobotModel, wheels: tuple[str, str], pendulum: Pendulum
+) -> tuple[float, float]:
+    """The largest torque (N m) at which a wheel does not slip, and the gain from a turn rate error
+    to torque.
+    """
     mass = pendulum.body_mass + pendulum.wheel_mass
     mu = model.links[model.joints[wheels[0]].child].surface.mu1
     grip = GRIP * (1.0 if mu is None else mu) * mass * GRAVITY / 2

@@ -8,20 +8,24 @@ from holozen.rotation import XYZ, XYZW, rotate, yaw
 
 from .engine import Box, Engine
 
+Placement = tuple[XYZ, XYZW]
+"""Position (m) and rotation of a root frame in the world."""
+
 Moved = tuple[XYZ, XYZW, Planar]
 """Position (m), rotation and body-frame velocity (m/s, rad/s) for odometry."""
 
 
 class Body:
-    """A body in the engine, in terms of its root frame. The engine uses the centre of mass, which is at `centre` in the
-    root frame, and calls the body by its `number`.
+    """A body in the engine, in terms of its root frame. The engine uses the centre of mass, which
+    is at `centre` in the root frame, and calls the body by its `number`.
     """
 
     def __init__(self, engine: Engine, number: int, centre: XYZ) -> None:
         self._engine, self.number, self._centre = engine, number, centre
         self.is_removed = False
         self.woken: Callable[[], None] = lambda: None  # called when it stops gliding
-        self.glides = False  # whether it keeps a velocity that was set once; others are set at each step
+        # whether it keeps a velocity that was set once; others are set at each step
+        self.glides = False
 
     def pose(self) -> tuple[XYZ, XYZW]:
         """Position and rotation of the root frame in the world."""
@@ -50,7 +54,9 @@ class Body:
         self._engine.move(self.number, velocity_at(centre, linear, angular), angular)
 
     def _place(self, position: XYZ, rotation: XYZW) -> XYZ:
-        """Place the root frame in the world. Returns the offset from it to the centre of mass, in the world."""
+        """Place the root frame in the world. Returns the offset from it to the centre of mass, in
+        the world.
+        """
         (x, y, z), (cx, cy, cz) = position, rotate(rotation, self._centre)
         self._engine.place(self.number, (x + cx, y + cy, z + cz), rotation)
         return cx, cy, cz
@@ -61,6 +67,8 @@ class Body:
         self._engine.remove(self.number)
 
     def _root(self) -> tuple[XYZ, XYZW, XYZ]:
-        """The centre of mass, the root frame's rotation, and the offset from the root to the centre, in the world."""
+        """The centre of mass, the root frame's rotation, and the offset from the root to the
+        centre, in the world.
+        """
         position, rotation = self._engine.centre(self.number)
         return position, rotation, rotate(rotation, self._centre)

@@ -1,8 +1,8 @@
 """The interface of a physics engine, and what a body is made of.
 
-`bullet.py` and `mujoco.py` implement it, and only they import an engine. Metres, kilograms, seconds; quaternions are
-x, y, z, w; positions, velocities and forces are in the world frame. A body is identified by the number that `add`
-returns, its parts by their indices, the root's first.
+`bullet.py` and `mujoco.py` implement it, and only they import an engine. Metres, kilograms,
+seconds; quaternions are x, y, z, w; positions, velocities and forces are in the world frame. A body
+is identified by the number that `add` returns, its parts by their indices, the root's first.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -25,14 +25,16 @@ UPRIGHT: XYZW = (0.0, 0.0, 0.0, 1.0)
 
 
 class Contact(Struct, frozen=True):
-    """The contact parameters of a part's shapes: the coefficient of friction, which is multiplied by that of the other
-    surface, and the share of it along the part's axle. `stiffness` in N/m and `damping` in N s/m; 0: the engine's own.
+    """The contact parameters of a part's shapes: the coefficient of friction, which is multiplied
+    by that of the other surface, and the share of it along the part's axle. `stiffness` in N/m and
+    `damping` in N s/m; 0: the engine's own. `yields`: the part is softer than the wheels beside it.
     """
 
     friction: float
     along_axle: float = 1.0
     stiffness: float = 0.0
     damping: float = 0.0
+    yields: bool = False
 
 
 class Engine(Protocol):
@@ -40,9 +42,17 @@ class Engine(Protocol):
 
     ground: int | None
 
-    def add(self, parts: Sequence[Part], contacts: Sequence[Contact], at: XYZ, rotation: XYZW, static: bool) -> int:
-        """Add a body at rest, its root frame at a pose and its joints at zero; a `static` one is fixed there. Gravity
-        does not act on the weightless share of a part's mass. Returns its number.
+    def add(
+        self,
+        parts: Sequence[Part],
+        contacts: Sequence[Contact],
+        at: XYZ,
+        rotation: XYZW,
+        static: bool,
+    ) -> int:
+        """Add a body at rest, its root frame at a pose and its joints at zero; a `static` one is
+        fixed there. Gravity does not act on the weightless share of a part's mass. Returns its
+        number.
         """
         ...
 
@@ -51,7 +61,9 @@ class Engine(Protocol):
         ...
 
     def step(self) -> None:
-        """Advance by one step. Raises ValueError or ArithmeticError if the numbers of a body are not finite."""
+        """Advance by one step. Raises ValueError or ArithmeticError if the numbers of a body are
+        not finite.
+        """
         ...
 
     def close(self) -> None:
@@ -103,7 +115,9 @@ class Engine(Protocol):
         ...
 
     def joints(self, number: int) -> JointStates:
-        """The states of a body's joints, in the order of its parts. The efforts are those of motors and friction."""
+        """The states of a body's joints, in the order of its parts. The efforts are those of motors
+        and friction.
+        """
         ...
 
     def joint(self, number: int, part: int) -> tuple[float, float]:
@@ -111,12 +125,16 @@ class Engine(Protocol):
         ...
 
     def turn(self, number: int, part: int, rate: float, effort: float) -> None:
-        """From now on, let the motor of a part's joint keep a rate, with at most an effort; rate 0 is friction."""
+        """From now on, let the motor of a part's joint keep a rate, with at most an effort; rate 0
+        is friction.
+        """
         ...
 
-    def go(self, number: int, part: int, position: float, closing: float, effort: float, rate: float) -> None:
-        """From now on, let the motor of a part's joint move it to a position, with a time constant of `closing` seconds
-        and at most an effort and a rate.
+    def go(
+        self, number: int, part: int, position: float, closing: float, effort: float, rate: float
+    ) -> None:
+        """From now on, let the motor of a part's joint move it to a position, with a time constant
+        of `closing` seconds and at most an effort and a rate.
         """
         ...
 
@@ -134,7 +152,9 @@ class Engine(Protocol):
 
 
 class Rays(Protocol):
-    """A world of shapes for rays and contact queries, without dynamics. `ground`: a level plane at z = 0."""
+    """A world of shapes for rays and contact queries, without dynamics. `ground`: a level plane at
+    z = 0.
+    """
 
     def __init__(self, ground: bool) -> None: ...
 
@@ -151,15 +171,17 @@ class Rays(Protocol):
         ...
 
     def cast(self, origin: XYZ, directions: Array, near: float, far: float, own: int) -> Array:
-        """The distances (n,) to the first hits between `near` and `far` (m) of rays along unit vectors (n, 3); infinite
-        without a hit. Rays pass through the shapes `own`.
+        """The distances (n,) to the first hits between `near` and `far` (m) of rays along unit
+        vectors (n, 3); infinite without a hit. Rays pass through the shapes `own`.
         """
         ...
 
-    def touched(self, number: int, within: float, but: Collection[int]) -> Iterator[tuple[int, XYZ, XYZ, float]]:
-        """The contacts of some shapes with others, except those in `but`, that are nearer than `within` (m). Of each:
-        the number of the others (0: the ground), a point on them, the unit normal out of them, and the distance,
-        negative if they overlap.
+    def touched(
+        self, number: int, within: float, but: Collection[int]
+    ) -> Iterator[tuple[int, XYZ, XYZ, float]]:
+        """The contacts of some shapes with others, except those in `but`, that are nearer than
+        `within` (m). Of each: the number of the others (0: the ground), a point on them, the unit
+        normal out of them, and the distance, negative if they overlap.
         """
         ...
 

@@ -20,8 +20,8 @@ from .world import World
 
 
 class Mover(Protocol):
-    """A robot's body with its drive. `names` are its joints, `wheels` those that both the drive and joint commands may
-    turn, `reserved` those that joint commands may not turn.
+    """A robot's body with its drive. `names` are its joints, `wheels` those that both the drive and
+    joint commands may turn, `reserved` those that joint commands may not turn.
     """
 
     @property
@@ -47,22 +47,31 @@ class Mover(Protocol):
 
 
 class Limited:
-    """Limits velocity and acceleration to those of the robot's file. A stop is immediate, whatever they are."""
+    """Limits velocity and acceleration to those of the robot's file. A stop is immediate, whatever
+    they are.
+    """
 
     def __init__(self, drive: Drive) -> None:
         self._drive = drive
-        limits = (drive.max_linear, drive.max_angular, drive.max_linear_acceleration, drive.max_angular_acceleration)
+        limits = (
+            drive.max_linear,
+            drive.max_angular,
+            drive.max_linear_acceleration,
+            drive.max_angular_acceleration,
+        )
         self._unlimited = all(math.isinf(limit) for limit in limits)
         self._now: Planar = (0.0, 0.0, 0.0)
         self.is_reached = True  # whether the last velocity returned is the wanted one
 
-    def __call__(self, wanted: Planar, dt: float) -> Planar:
-        """The velocity of the next step of `dt` seconds."""
+    def follow(self, wanted: Planar, dt: float) -> Planar:
+        """Go on towards a velocity. Returns that of the next step of `dt` seconds."""
         drive = self._drive
         if self._unlimited:
             return wanted
         wanted = clamp_speed(wanted, drive.max_linear, drive.max_angular)
-        slower = all(abs(w) <= abs(n) and w * n >= 0 for w, n in zip(wanted, self._now, strict=True))
+        slower = all(
+            abs(w) <= abs(n) and w * n >= 0 for w, n in zip(wanted, self._now, strict=True)
+        )
         limits = (drive.max_linear_acceleration, drive.max_angular_acceleration)
         self._now = wanted if slower else ramp(self._now, wanted, *limits, dt)
         self.is_reached = self._now == wanted
@@ -70,17 +79,21 @@ class Limited:
 
 
 def mover_for(world: World, model: RobotModel, at: XYZ, rotation: XYZW = UPRIGHT) -> Mover:
-    """Put a robot into the world, with its root frame at `at`. A static one is not driven. Raises RobotError if the
-    engine cannot simulate it, and then leaves nothing behind.
+    """Put a robot into the world, with its root frame at `at`. A static one is not driven. Raises
+    RobotError if the engine cannot simulate it, and then leaves nothing behind.
     """
     mechanism = model.drive.mechanism if model.drive and not model.static else None
     if isinstance(mechanism, PlanarDrive | Mecanum):
-        rolling = MecanumWheels(model, mechanism) if isinstance(mechanism, Mecanum) else Wheels(model)
+        rolling = (
+            MecanumWheels(model, mechanism) if isinstance(mechanism, Mecanum) else Wheels(model)
+        )
         return PlanarMover(world.add(lump(model), at, rotation), rolling)
     if isinstance(mechanism, Omni):
         omni = omni_wheels(model)
         spheres = [wheel for wheel in omni if not has_rollers(model, wheel)]
-        return OmniMover(world.add_jointed(model, at, rotation, omni=spheres), model, mechanism, omni)
+        return OmniMover(
+            world.add_jointed(model, at, rotation, omni=spheres), model, mechanism, omni
+        )
     wheels = (*mechanism.left, *mechanism.right) if isinstance(mechanism, Differential) else ()
     body = world.add_jointed(model, at, rotation, frozenset(wheels))
     try:

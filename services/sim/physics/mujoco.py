@@ -1,11 +1,13 @@
 """`Engine` and `Rays` in MuJoCo.
 
-The model is recompiled when a body is added or removed, which takes 7 ms, and 2 ms more for each robot that there is.
+The model is recompiled when a body is added or removed, which takes 7 ms, and 2 ms more for each
+robot that there is.
 """
 
 import math
 from collections.abc import Collection, Iterator, Sequence
 from itertools import count
+from typing import Any
 
 import mujoco as mj
 import numpy as np
@@ -20,27 +22,40 @@ from holozen.robot.rigid import Part, PlacedShape
 from holozen.robot.rotation import triple
 from holozen.rotation import XYZ, XYZW, conjugate, rotate
 
+from .concave import convex_pieces
 from .dynamics import FRICTION, damping_of
 from .engine import UPRIGHT, Array, Box, Contact, Engine, JointStates, Rays
 
-KINDS = {"box": mj.mjtGeom.mjGEOM_BOX, "cylinder": mj.mjtGeom.mjGEOM_CYLINDER, "sphere": mj.mjtGeom.mjGEOM_SPHERE}
+KINDS = {
+    "box": mj.mjtGeom.mjGEOM_BOX,
+    "cylinder": mj.mjtGeom.mjGEOM_CYLINDER,
+    "sphere": mj.mjtGeom.mjGEOM_SPHERE,
+}
 ENDLESS = 1e6  # m; half the width of a plane's bounding box
 THIN = 1e-4  # m; the least thickness of a hull: the engine takes no flat ones
 MEMORY = 1 << 28  # bytes of address space for contacts; only what is used takes memory
 EXCLUDED = 1  # of a contact: it has no force
-RIGID = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance of motors and joint limits, the highest that the engine allows
+# impedance of motors and joint limits, the highest that the engine allows
+RIGID = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 FIRM = (0.95, 0.99, 0.001, 0.5, 2.0)  # impedance of contacts
 STEPS = 2.0  # time constant of motors in steps, the shortest that the engine allows
-FIRM_BACK, GENTLE_BACK = 20.0, 9.0  # 1/s; how fast contacts, and joint limits, recover from penetration
-RIM = 0.7  # the least sine of the angle between a wheel's axle and the normal of a contact on its rim
-PARALLEL = 0.99  # the least cosine of the angle between the axle and the axis of a cylinder that is a wheel
-LEAST = 1e-3  # the least friction; the solver does not converge if it differs too much along and across the axle
+# 1/s; how fast contacts, and joint limits, recover from penetration
+FIRM_BACK, GENTLE_BACK = (20.0, 9.0)
+# shares of the stiffness and the damping of contacts, of casters beside two wheels
+SOFT, SOFT_DAMPING = (0.03, 0.3)
+# the least sine of the angle between a wheel's axle and the normal of a contact on its rim
+RIM = 0.7
+# the least cosine of the angle between the axle and the axis of a cylinder that is a wheel
+PARALLEL = 0.99
+# the least friction; the solver does not converge if it differs too much along and across the axle
+LEAST = 1e-3
 
 
 Indices = npt.NDArray[np.intp]
 
 
-mj.set_mju_user_warning(lambda text: report(f"sim: warning: mujoco: {text}"))  # else it writes a log file
+# else it writes a log file
+mj.set_mju_user_warning(lambda text: report(f"sim: warning: mujoco: {text}"))
 
 
 class _Kept(Struct, eq=False):
@@ -64,9 +79,11 @@ class _Kept(Struct, eq=False):
 class MuJoCo(Engine):
     """A world in MuJoCo: see `Engine`.
 
-    A joint's motor is its dry friction, about the commanded rate instead of about rest: the solver finds its effort
-    together with all contacts, and bounds it. The friction of two surfaces is multiplied, and wheels have less of it
-    along their axles: MuJoCo has neither, so both are set between collision detection and the solver.
+    A joint's motor is its dry friction, about the commanded rate instead of about rest: the solver
+    finds its effort together with all contacts, and bounds it. The friction of two surfaces is
+    multiplied, and wheels have less of it along their axles: MuJoCo has neither, so both are set
+    between collision detection and the
+        solver.
     """
 
     def __init__(self, spec: WorldSpec) -> None:
@@ -78,7 +95,10 @@ class MuJoCo(Engine):
         option.integrator, option.cone = mj.mjtIntegrator.mjINT_IMPLICIT, mj.mjtCone.mjCONE_ELLIPTIC
         option.impratio = 10.0  # friction yields less than support does
         self._dt = spec.step
-        self._firm, self._gentle = ((-back / spec.step, -1 / spec.step) for back in (FIRM_BACK, GENTLE_BACK))
+        self._firm, self._gentle = (
+            (-back / spec.step, -1 / spec.step) for back in (FIRM_BACK, GENTLE_BACK)
+        )
+        self._soft = -FIRM_BACK * SOFT / spec.step, -SOFT_DAMPING / spec.step
         self._all: dict[int, _Kept] = {}
         self._numbers = count(1)
         self.ground: int | None = None
@@ -90,7 +110,14 @@ class MuJoCo(Engine):
         self._data = mj.MjData(self._model)
         self._compiled()
 
-    def add(self, parts: Sequence[Part], contacts: Sequence[Contact], at: XYZ, rotation: XYZW, static: bool) -> int:
+    def add(
+        self,
+        parts: Sequence[Part],
+        contacts: Sequence[Contact],
+        at: XYZ,
+        rotation: XYZW,
+        static: bool,
+    ) -> int:
         made: list[mj.MjsBody] = []
         motors = []
         for index, (part, contact) in enumerate(zip(parts, contacts, strict=True)):
@@ -105,11 +132,15 @@ class MuJoCo(Engine):
             made.append(body)
             if part.joint or not static:
                 body.explicitinertial = True
-                body.mass, body.ipos, body.iquat = part.body.mass, part.body.centre, _wxyz(part.body.axes)
+                body.mass, body.ipos, body.iquat = (
+                    part.body.mass,
+                    part.body.centre,
+                    _wxyz(part.body.axes),
+                )
                 body.inertia = part.body.inertia
                 body.gravcomp = part.body.weightless / part.body.mass
             for shape in part.body.collisions:
-                if (geom := _add_shape(self._spec, body, shape)) is not None:
+                for geom in _add_shape(self._spec, body, shape):
                     self._touching(geom, contact)
         number = next(self._numbers)
         self._all[number] = _Kept(tuple(parts), tuple(contacts), static, made, motors)
@@ -126,18 +157,28 @@ class MuJoCo(Engine):
         assert part.joint is not None
         slides, limits = part.joint.kind == "prismatic", part.joint.limits
         joint = body.add_joint(
-            type=mj.mjtJoint.mjJNT_SLIDE if slides else mj.mjtJoint.mjJNT_HINGE, axis=part.joint.axis
+            type=mj.mjtJoint.mjJNT_SLIDE if slides else mj.mjtJoint.mjJNT_HINGE,
+            axis=part.joint.axis,
         )
         joint.damping = [damping, 0.0, 0.0] if np.ndim(joint.damping) else damping
-        joint.frictionloss, joint.solref_friction, joint.solimp_friction = 1.0, (STEPS * self._dt, 1.0), RIGID
+        joint.frictionloss, joint.solref_friction, joint.solimp_friction = (
+            1.0,
+            (STEPS * self._dt, 1.0),
+            RIGID,
+        )
         joint.solref_limit, joint.solimp_limit = self._gentle, RIGID
-        if math.isfinite(limits.lower) and math.isfinite(limits.upper) and limits.lower < limits.upper:
+        if (
+            math.isfinite(limits.lower)
+            and math.isfinite(limits.upper)
+            and limits.lower < limits.upper
+        ):
             joint.limited, joint.range = mj.mjtLimited.mjLIMITED_TRUE, (limits.lower, limits.upper)
         else:
             joint.limited = mj.mjtLimited.mjLIMITED_FALSE
 
     def _touching(self, geom: mj.MjsGeom, contact: Contact) -> None:
-        geom.solref, geom.solimp = self._firm, FIRM
+        geom.solref, geom.solimp = self._soft if contact.yields else self._firm, FIRM
+        geom.priority = int(contact.yields)  # else the firmer of two surfaces counts
         geom.friction = [contact.friction, 0.0, 0.0]
         geom.condim = 3
         if not contact.friction:  # there is none, whatever the other surface has
@@ -164,7 +205,9 @@ class MuJoCo(Engine):
             kept.at = int(model.jnt_qposadr[model.body_jntadr[first]]) if not kept.static else -1
             kept.speed = int(model.body_dofadr[first]) if not kept.static else -1
             kept.joints_speed = [int(model.body_dofadr[index]) for index in kept.ids[1:]]
-            kept.joints_at = [int(model.jnt_qposadr[model.body_jntadr[index]]) for index in kept.ids[1:]]
+            kept.joints_at = [
+                int(model.jnt_qposadr[model.body_jntadr[index]]) for index in kept.ids[1:]
+            ]
             for body, part, contact in zip(kept.ids, kept.parts, kept.contacts, strict=True):
                 if part.joint and part.joint.kind == "continuous":
                     geoms = np.flatnonzero(model.geom_bodyid == body)
@@ -175,9 +218,12 @@ class MuJoCo(Engine):
             if kept.frozen:
                 self._freeze(kept)
         self._has_wheels = bool(self._turns.any())
-        ends = np.array([rotate(_xyzw(turn), (0.0, 0.0, 1.0)) for turn in model.geom_quat.tolist()]).reshape(-1, 3)
+        ends = np.array(
+            [rotate(_xyzw(turn), (0.0, 0.0, 1.0)) for turn in model.geom_quat.tolist()]
+        ).reshape(-1, 3)
         round_ = model.geom_type == mj.mjtGeom.mjGEOM_CYLINDER
-        self._flat = round_ & (np.abs(np.sum(ends * self._axles, axis=1)) > PARALLEL)  # cylinders that are wheels
+        # cylinders that are wheels
+        self._flat = round_ & (np.abs(np.sum(ends * self._axles, axis=1)) > PARALLEL)
         self._efforts = np.zeros(model.nv)
         self._planes = model.geom_type == mj.mjtGeom.mjGEOM_PLANE
         self._located()
@@ -191,6 +237,21 @@ class MuJoCo(Engine):
         self._compile()
 
     def step(self) -> None:
+        """One step of the world: the calls of `mj_step`, in its order, with changes to the solver's
+        arrays in between.
+
+        The friction of a contact is here the product of both surfaces' and differs along and across
+        an axle, and the contacts within a robot are excluded. All that has to be set after
+        `mj_collision`, which makes the contacts, and before `mj_makeConstraint`, which uses them.
+        No callback of MuJoCo's comes there: `mjcb_contactfilter` sees pairs of shapes that have no
+        contact yet, and `mjcb_control` comes when the constraints are made. And callbacks are
+        global, for all worlds of the process.
+
+        A motor is MuJoCo's dry friction of its joint, which has a bounded effort and holds as no
+        actuator does, but brakes towards rest. `mj_fwdVelocity` calculates the reference
+        acceleration that does so; the wanted rate is added to that before `mj_fwdConstraint` solves
+        for the efforts.
+        """
         model, data = self._model, self._data
         if not math.isfinite(float(data.qpos.sum() + data.qvel.sum())):
             raise ValueError("a pose or velocity is not finite")
@@ -223,19 +284,24 @@ class MuJoCo(Engine):
         self._located()
 
     def _set_contacts(self) -> None:
-        """Multiply the friction of both surfaces, exclude contacts within one body, and correct those of wheels."""
+        """Multiply the friction of both surfaces, exclude contacts within one body, and correct
+        those of wheels.
+        """
         contacts, model = self._data.contact, self._model
         pairs = contacts.geom
         owners = self._owner[model.geom_bodyid[pairs]]
         contacts.exclude[owners[:, 0] == owners[:, 1]] = EXCLUDED
-        contacts.friction[:, :2] = np.maximum(self._mu[pairs[:, :1]] * self._mu[pairs[:, 1:]], LEAST)
+        contacts.friction[:, :2] = np.maximum(
+            self._mu[pairs[:, :1]] * self._mu[pairs[:, 1:]], LEAST
+        )
         for geoms in pairs.T if self._has_wheels else ():
             if len(chosen := np.flatnonzero(self._turns[geoms])):
                 self._set_wheels(chosen, geoms[chosen])
 
     def _set_wheels(self, chosen: Indices, geoms: Indices) -> None:
-        """Correct the contacts `chosen` of the wheels `geoms`. On the rim of a cylinder they move to its middle, since
-        its edges would scrub as it turns about the vertical; and friction differs along and across the axle.
+        """Correct the contacts `chosen` of the wheels `geoms`. On the rim of a cylinder they move
+        to its middle, since its edges would scrub as it turns about the vertical; and friction
+        differs along and across the axle.
         """
         contacts, model, data = self._data.contact, self._model, self._data
         turns = data.xmat[model.geom_bodyid[geoms]].reshape(-1, 3, 3)
@@ -244,12 +310,18 @@ class MuJoCo(Engine):
         level = axles - np.sum(axles * normals, axis=1, keepdims=True) * normals
         lengths = np.linalg.norm(level, axis=1)
         on_rim = lengths > RIM
-        aside = np.sum((contacts.pos[chosen] - data.geom_xpos[geoms]) * axles, axis=1) * self._flat[geoms]
+        aside = (
+            np.sum((contacts.pos[chosen] - data.geom_xpos[geoms]) * axles, axis=1)
+            * self._flat[geoms]
+        )
         contacts.pos[chosen[on_rim]] -= (aside[:, None] * axles)[on_rim]
         slides = on_rim & (self._along[geoms] < 1)
         if slides.any():
             index, across = chosen[slides], level[slides] / lengths[slides, None]
-            contacts.frame[index, 3:6], contacts.frame[index, 6:9] = across, np.cross(normals[slides], across)
+            contacts.frame[index, 3:6], contacts.frame[index, 6:9] = (
+                across,
+                np.cross(normals[slides], across),
+            )
             mu = contacts.friction[index, 0] * self._along[geoms[slides]]
             contacts.friction[index, 0] = np.maximum(mu, LEAST)
 
@@ -295,7 +367,10 @@ class MuJoCo(Engine):
         _, rotation = self.centre(number)
         cx, cy, cz = rotate(rotation, kept.parts[0].body.centre)
         at_root = velocity_at((-cx, -cy, -cz), linear, angular)
-        self._data.qvel[kept.speed : kept.speed + 6] = (*at_root, *rotate(conjugate(rotation), angular))
+        self._data.qvel[kept.speed : kept.speed + 6] = (
+            *at_root,
+            *rotate(conjugate(rotation), angular),
+        )
 
     def freeze(self, number: int) -> None:
         self._all[number].frozen = True
@@ -344,10 +419,13 @@ class MuJoCo(Engine):
         apart = np.maximum(low[:, None] - high2, low2 - high[:, None]).max(axis=2)
         points = np.zeros(6)
         least = within
-        for i, j in np.argwhere((apart < within + 1e-9) | self._planes[theirs]):  # the box of a plane is far from it
+        # the box of a plane is far from it
+        for i, j in np.argwhere((apart < within + 1e-9) | self._planes[theirs]):
             pair = int(mine[i]), int(theirs[j])
             # With a limit of 0 the engine reports no depth.
-            least = min(least, mj.mj_geomDistance(self._model, self._data, *pair, max(within, 1e-6), points))
+            least = min(
+                least, mj.mj_geomDistance(self._model, self._data, *pair, max(within, 1e-6), points)
+            )
         return least
 
     def _geoms(self, number: int) -> Indices:
@@ -377,7 +455,9 @@ class MuJoCo(Engine):
         kept.goals.pop(part, None)
         self._set_motor(kept, part, rate, effort)
 
-    def go(self, number: int, part: int, position: float, closing: float, effort: float, rate: float) -> None:
+    def go(
+        self, number: int, part: int, position: float, closing: float, effort: float, rate: float
+    ) -> None:
         kept = self._all[number]
         self._set_motor(kept, part, 0.0, effort)
         kept.goals[part] = (position, max(closing, self._dt), rate)
@@ -402,7 +482,15 @@ class MuJoCo(Engine):
         if not self._is_fresh:
             self._located()
         data, body = self._data, self._all[number].ids[part]
-        mj.mj_applyFT(self._model, data, np.array(force), np.array(torque), np.array(point), body, data.qfrc_applied)
+        mj.mj_applyFT(
+            self._model,
+            data,
+            np.array(force),
+            np.array(torque),
+            np.array(point),
+            body,
+            data.qfrc_applied,
+        )
 
 
 class MuJoCoRays(Rays):
@@ -441,13 +529,19 @@ class MuJoCoRays(Rays):
         start, ways = np.array(origin), np.ascontiguousarray(directions)
         found, geoms = np.empty(len(ways)), np.empty(len(ways), np.int32)
         body = self._bodies[own].id
-        mj.mj_multiRay(model, data, start, ways.ravel(), None, True, body, geoms, found, None, len(ways), far)
+        mj.mj_multiRay(
+            model, data, start, ways.ravel(), None, True, body, geoms, found, None, len(ways), far
+        )
         for index in np.flatnonzero((found >= 0) & (found < near)):  # look behind what is too near
-            beyond = mj.mj_ray(model, data, start + near * ways[index], ways[index], None, True, body, None)
+            beyond = mj.mj_ray(
+                model, data, start + near * ways[index], ways[index], None, True, body, None
+            )
             found[index] = near + beyond if beyond >= 0 else -1.0
         return np.where((found < 0) | (found > far), np.inf, found)
 
-    def touched(self, number: int, within: float, but: Collection[int]) -> Iterator[tuple[int, XYZ, XYZ, float]]:
+    def touched(
+        self, number: int, within: float, but: Collection[int]
+    ) -> Iterator[tuple[int, XYZ, XYZ, float]]:
         model, data = self._placed()
         owners = {body.id: owner for owner, body in self._bodies.items()}
         bodies, fromto = [owners.get(body, 0) for body in model.geom_bodyid.tolist()], np.zeros(6)
@@ -455,16 +549,25 @@ class MuJoCoRays(Rays):
             for other, owner in enumerate(bodies):
                 if owner == number or owner in but:
                     continue
-                reach = within + model.geom_rbound[own] + model.geom_rbound[other]  # 0 of a plane, which has no end
-                if model.geom_rbound[other] and math.dist(data.geom_xpos[own], data.geom_xpos[other]) > reach:
+                # 0 of a plane, which has no end
+                reach = within + model.geom_rbound[own] + model.geom_rbound[other]
+                if (
+                    model.geom_rbound[other]
+                    and math.dist(data.geom_xpos[own], data.geom_xpos[other]) > reach
+                ):
                     continue
                 distance = mj.mj_geomDistance(model, data, own, other, within, fromto)
                 if distance >= within:
                     continue
                 away = (fromto[:3] - fromto[3:]) * math.copysign(1.0, distance)
-                if np.linalg.norm(away) < THIN:  # they only just touch: the line between both points has no direction
+                # they only just touch: the line between both points has no direction
+                if np.linalg.norm(away) < THIN:
                     plane = data.geom_xmat[other][2::3]
-                    away = data.geom_xpos[own] - data.geom_xpos[other] if model.geom_rbound[other] else plane
+                    away = (
+                        data.geom_xpos[own] - data.geom_xpos[other]
+                        if model.geom_rbound[other]
+                        else plane
+                    )
                 yield owner, triple(fromto[3:]), triple(away / np.linalg.norm(away)), distance
 
     def _placed(self) -> tuple[mj.MjModel, mj.MjData]:
@@ -485,26 +588,38 @@ class MuJoCoRays(Rays):
         self._compiled = None
 
 
-def _add_shape(spec: mj.MjSpec, body: mj.MjsBody, placed: PlacedShape) -> mj.MjsGeom | None:
-    """Add a collision shape to a body. Returns None for a kind that has no collisions."""
+def _add_shape(spec: mj.MjSpec, body: mj.MjsBody, placed: PlacedShape) -> list[mj.MjsGeom]:
+    """Add a collision shape to a body: one that is not convex as convex pieces. Returns nothing for
+    a kind that has no collisions.
+    """
     shape, at = placed.shape, {"pos": placed.xyz, "quat": _wxyz(placed.quaternion)}
     if shape.kind in KINDS:
         x, y, z = (*shape.size, 0.0, 0.0)[:3]
         sizes = {"box": (x / 2, y / 2, z / 2), "cylinder": (x, y / 2, 0.0), "sphere": (x, 0.0, 0.0)}
-        return body.add_geom(type=KINDS[shape.kind], size=sizes[shape.kind], **at)
+        return [body.add_geom(type=KINDS[shape.kind], size=sizes[shape.kind], **at)]
     if shape.kind == "plane":
-        return body.add_geom(type=mj.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], **at)
+        return [body.add_geom(type=mj.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], **at)]
     if shape.kind != "hull":
-        return None
-    name = f"hull {hash(shape.points)}"  # equal hulls share a mesh, which stays when their bodies are removed
+        return []
+    pieces = convex_pieces(shape) if shape.triangles else (shape.points,)
+    return [_add_hull(spec, body, points, at) for points in pieces]
+
+
+def _add_hull(
+    spec: mj.MjSpec, body: mj.MjsBody, points: tuple[XYZ, ...], at: dict[str, Any]
+) -> mj.MjsGeom:
+    # equal hulls share a mesh, which stays when their bodies are removed
+    name = f"hull {hash(points)}"
     if spec.mesh(name) is None:
         inertia = mj.mjtMeshInertia.mjMESH_INERTIA_CONVEX
-        spec.add_mesh(name=name, uservert=_thick(np.array(shape.points)).ravel(), inertia=inertia)
+        spec.add_mesh(name=name, uservert=_thick(np.array(points)).ravel(), inertia=inertia)
     return body.add_geom(type=mj.mjtGeom.mjGEOM_MESH, meshname=name, **at)
 
 
 def _thick(points: Array) -> Array:
-    """The points (n, 3) of a hull. If they are in a plane, those (2 n, 3) of a hull as thin as the engine allows."""
+    """The points (n, 3) of a hull. If they are in a plane, those (2 n, 3) of a hull as thin as the
+    engine allows.
+    """
     middle = points - points.mean(axis=0)
     _, sizes, axes = np.linalg.svd(middle, full_matrices=False)
     if len(points) < 4 or sizes[-1] < THIN:

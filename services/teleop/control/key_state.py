@@ -1,9 +1,9 @@
 """Which keys are held. Pure: times are arguments, in seconds.
 
-In the mode `hold` a key counts while it is held: from press to release if the terminal reports both, else while it
-repeats. A terminal without key releases only repeats a held key, once after a first delay, and then at an interval.
-Both are measured, and a key counts as held until a repeat is overdue. In the mode `latch` a key counts until another
-one is pressed.
+In the mode `hold` a key counts while it is held: from press to release if the terminal reports
+both, else while it repeats. A terminal without key releases only repeats a held key, once after a
+first delay, and then at an interval. Both are measured, and a key counts as held until a repeat is
+overdue. In the mode `latch` a key counts until another one is pressed.
 """
 
 import math
@@ -13,7 +13,7 @@ from collections import deque
 FIRST = 0.7  # s; bound of an unknown first delay: X has 0.66, most others 0.25 to 0.5
 EVERY = 0.2  # s; bound of an unknown interval
 SLACK = 0.045  # s; tolerance for a late repeat
-SHORTEST, LONGEST = 0.15, 0.75  # s; range of a first delay
+MIN_FIRST_DELAY, MAX_FIRST_DELAY = 0.15, 0.75  # s; range of a first delay
 SLOWEST = 0.25  # s; bound of an interval
 LAST = 16  # gaps over which the interval is measured
 SURE = 4  # repeats; fewer may be taps
@@ -46,7 +46,7 @@ class Repeat:
             self._repeats, self._maybe = 0, 0.0
             return False
         self._repeats += 1
-        if self._repeats == 1 and gap > SHORTEST:
+        if self._repeats == 1 and gap > MIN_FIRST_DELAY:
             self._maybe = gap
         elif gap < SLOWEST:
             self._gaps.append(gap)
@@ -66,15 +66,17 @@ class Repeat:
         if self.every is not None and gap <= 1.5 * self.every:
             return True  # no person types that fast
         if self.first is None:
-            return SHORTEST <= gap <= LONGEST
-        return 0.7 * self.first <= gap <= min(1.3 * self.first, LONGEST)
+            return MIN_FIRST_DELAY <= gap <= MAX_FIRST_DELAY
+        return 0.7 * self.first <= gap <= min(1.3 * self.first, MAX_FIRST_DELAY)
 
 
 HOLD, LATCH = "hold", "latch"
 
 
 class KeyState:
-    """The held keys. With a `timeout` a typed key counts for that many seconds; without, while it repeats."""
+    """The held keys. With a `timeout` a typed key counts for that many seconds; without, while it
+    repeats.
+    """
 
     def __init__(self, mode: str = HOLD, timeout: float | None = None) -> None:
         self.mode = mode
@@ -83,8 +85,10 @@ class KeyState:
         self._pressed: dict[str, str] = {}  # code -> key
         self._typed = ""
         self._at = 0.0  # when it was typed
-        self._spent = ""  # a typed key, released while it repeats: it counts again only once it is pressed again
-        self._ignored = -math.inf  # when the spent key was last seen, if it must not count before it is released
+        # a typed key, released while it repeats: it counts again only once it is pressed again
+        self._spent = ""
+        # when the spent key was last seen, if it must not count before it is released; else None
+        self._ignored_at: float | None = None
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -103,10 +107,13 @@ class KeyState:
         return self._pressed.pop(code, None) is not None
 
     def type(self, key: str, now: float) -> bool:
-        """Take a typed key, whose release will not be reported; returns whether it counts as held."""
+        """Take a typed key, whose release will not be reported; returns whether it counts as
+        held.
+        """
         again = self.repeat.see(key, now)
-        if self._spent == key and now - self._ignored <= LONGEST:
-            self._ignored = now  # it may have been held all the time
+        ignored_at = self._ignored_at if self._spent == key else None
+        if ignored_at is not None and now - ignored_at <= MAX_FIRST_DELAY:
+            self._ignored_at = now  # it may have been held all the time
             return False
         if again and self._spent == key:
             return False
@@ -114,19 +121,23 @@ class KeyState:
         return True
 
     def interrupt(self, key: str, now: float) -> None:
-        """Take a typed key that moves nothing. It ends the repeats of other keys: typed again, they are new presses."""
+        """Take a typed key that moves nothing. It ends the repeats of other keys: typed again, they
+        are new presses.
+        """
         self.repeat.see(key, now)
         self._spent = ""
 
     def ignore(self, key: str, now: float) -> None:
-        """Take a typed key that counts only after it has been released for longer than any first delay."""
+        """Take a typed key that counts only after it has been released for longer than any first
+        delay.
+        """
         self.repeat.see(key, now)
-        self._spent, self._ignored = key, now
+        self._spent, self._ignored_at = key, now
 
     def let_go(self) -> None:
         """Release all keys; one that is still down counts again once it is released and pressed."""
         if self._typed:
-            self._spent, self._ignored = self._typed, -math.inf
+            self._spent, self._ignored_at = self._typed, None
         self._pressed, self._typed = {}, ""
 
     def expire(self, now: float) -> bool:

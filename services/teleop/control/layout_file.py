@@ -12,11 +12,15 @@ from .layouts import ACTIONS, FIXED, LAYOUTS, Direction, KeyNameError, Layout, k
 T = TypeVar("T")
 
 MOTIONS: dict[str, Direction] = {
-    "forward": (1, 0, 0, 0), "back": (-1, 0, 0, 0),
-    "left": (0, 1, 0, 0), "right": (0, -1, 0, 0),
-    "up": (0, 0, 1, 0), "down": (0, 0, -1, 0),
-    "turn-left": (0, 0, 0, 1), "turn-right": (0, 0, 0, -1),
-}  # fmt: skip
+    "forward": (1, 0, 0, 0),
+    "back": (-1, 0, 0, 0),
+    "left": (0, 1, 0, 0),
+    "right": (0, -1, 0, 0),
+    "up": (0, 0, 1, 0),
+    "down": (0, 0, -1, 0),
+    "turn-left": (0, 0, 0, 1),
+    "turn-right": (0, 0, 0, -1),
+}
 MAX_PERCENT = 90.0
 _FACTOR = re.compile(r"(\S+)\s+([+-]\d{1,3}(?:\.\d{1,3})?)\s?%")
 _TOP = ["name", "positional", "moves", "speeds", "actions"]
@@ -56,14 +60,18 @@ def _layout(path: str, found: Mapping[str, Any]) -> Layout:
     speeds = _section(found, "speeds", _factors, taken)
     actions = _section(found, "actions", _action, taken)
     if not moves:
-        raise _Wrong('[moves] has no key, so nothing would drive; write lines such as w = "forward"')
+        raise _Wrong(
+            '[moves] has no key, so nothing would drive; write lines such as w = "forward"'
+        )
     return Layout(name, moves, speeds, {**FIXED, **actions}, positional)
 
 
 def _section(
     found: Mapping[str, Any], section: str, meaning: Callable[[str], T], taken: dict[str, str]
 ) -> dict[str, T]:
-    """The meanings in a section, by canonical key names. `taken`, the keys of earlier sections, is extended."""
+    """The meanings in a section, by canonical key names. `taken`, the keys of earlier sections, is
+    extended.
+    """
     lines = found.get(section, {})
     if not isinstance(lines, dict):
         raise _Wrong(f"{section} is {cut(lines)}; write a section [{section}] of lines")
@@ -112,7 +120,9 @@ def _motion(text: str) -> Direction:
 def _factors(text: str) -> tuple[float, float]:
     match = _FACTOR.fullmatch(text.strip())
     if not match or abs(float(match[2])) > MAX_PERCENT:
-        raise _Wrong(f"write both, speed or turn and up to {MAX_PERCENT:.0f} %, such as 'both +10%'")
+        raise _Wrong(
+            f"write both, speed or turn and up to {MAX_PERCENT:.0f} %, such as 'both +10%'"
+        )
     factor = round(1 + float(match[2]) / 100, 6)
     which = {"both": (factor, factor), "speed": (factor, 1.0), "turn": (1.0, factor)}
     if match[1] not in which:

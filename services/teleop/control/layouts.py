@@ -1,4 +1,6 @@
-"""What each key means, as data: the layouts `ttk`, `wasd` and `arrows`, and the help that is made from them."""
+"""What each key means, as data: the layouts `ttk`, `wasd` and `arrows`, and the help that is made
+from them.
+"""
 
 import re
 import textwrap
@@ -11,15 +13,40 @@ from msgspec import Struct
 from ..toml_file import one_of
 
 NAMED = (
-    "up", "down", "left", "right", "space", "tab", "escape", "enter", "backspace",
-    "insert", "delete", "home", "end", "pageup", "pagedown", *(f"f{number}" for number in range(1, 13)),
-)  # fmt: skip
-SAME = {"ctrl+i": "tab", "ctrl+m": "enter", "ctrl+j": "enter", "ctrl+h": "backspace", "ctrl+[": "escape"}
+    "up",
+    "down",
+    "left",
+    "right",
+    "space",
+    "tab",
+    "escape",
+    "enter",
+    "backspace",
+    "insert",
+    "delete",
+    "home",
+    "end",
+    "pageup",
+    "pagedown",
+    *(f"f{number}" for number in range(1, 13)),
+)
+SAME = {
+    "ctrl+i": "tab",
+    "ctrl+m": "enter",
+    "ctrl+j": "enter",
+    "ctrl+h": "backspace",
+    "ctrl+[": "escape",
+}
 """Keys for which a terminal sends the same bytes as for another key."""
 
 FIXED = {
-    "ctrl+c": "quit", "ctrl+z": "suspend", "?": "help", "tab": "next_robot", "space": "stop", "escape": "stop",
-}  # fmt: skip
+    "ctrl+c": "quit",
+    "ctrl+z": "suspend",
+    "?": "help",
+    "tab": "next_robot",
+    "space": "stop",
+    "escape": "stop",
+}
 """Keys that do the same in every layout. With --deadman space is the dead-man instead."""
 
 _MODIFIERS = ("ctrl", "alt", "shift")
@@ -42,7 +69,9 @@ def key_name(text: str) -> str:
     if is_character(last):
         _check_character(modifiers, last)
     elif last not in NAMED:
-        raise KeyNameError(f"is not a key: write one character, or a name{one_of(last, list(NAMED))}")
+        raise KeyNameError(
+            f"is not a key: write one character, or a name{one_of(last, list(NAMED))}"
+        )
     name = "+".join([*modifiers, last])
     if text != name:
         raise KeyNameError(f"is not a key: write {name!r}")
@@ -111,13 +140,25 @@ def _which(factors: tuple[float, float]) -> str:
 
 
 def _pairs(moves: Mapping[str, "Direction"]) -> list[tuple[str, str]]:
-    """The simple motions, each with its opposite; then combinations with turning, and the diagonals."""
+    """The simple motions, each with its opposite; then combinations with turning, and the
+    diagonals.
+    """
     found = []
     for axis, words in enumerate(PAIRS):
         ways = [tuple(sign * (index == axis) for index in range(4)) for sign in (1, -1)]
         found.append(("/".join(key for way in ways for key in _keys(moves, way)[:1]), words))
-    found.append((" ".join(key for key, way in moves.items() if (way[0] or way[1]) and way[3]), "while turning"))
-    found.append((" ".join(key for key, way in moves.items() if way[0] and way[1] and not way[3]), "diagonal"))
+    found.append(
+        (
+            " ".join(key for key, way in moves.items() if (way[0] or way[1]) and way[3]),
+            "while turning",
+        )
+    )
+    found.append(
+        (
+            " ".join(key for key, way in moves.items() if way[0] and way[1] and not way[3]),
+            "diagonal",
+        )
+    )
     return [(keys, words) for keys, words in found if keys]
 
 
@@ -126,11 +167,16 @@ def _speeds(speeds: Mapping[str, tuple[float, float]]) -> list[tuple[str, str]]:
     found: dict[str, dict[bool, str]] = {}
     for key, factors in speeds.items():
         found.setdefault(_which(factors), {}).setdefault(max(factors) > 1, key)
-    return [("/".join(ways[way] for way in (True, False) if way in ways), words) for words, ways in found.items()]
+    return [
+        ("/".join(ways[way] for way in (True, False) if way in ways), words)
+        for words, ways in found.items()
+    ]
 
 
 Direction = tuple[int, int, int, int]
-"""Forward, left, up, counter-clockwise: each is -1, 0 or 1, to be multiplied by the speed, the last by the turn."""
+"""Forward, left, up, counter-clockwise: each is -1, 0 or 1, to be multiplied by the speed, the last
+by the turn.
+"""
 
 ACTIONS = ("stop", "resume", "next_robot", "help", "quit", "suspend")
 
@@ -138,8 +184,8 @@ ACTIONS = ("stop", "resume", "next_robot", "help", "quit", "suspend")
 class Layout(Struct, frozen=True, dict=True):
     """The meaning of keys, by the names of `key_name`; a key that is in no table stops the robot.
 
-    `speeds` holds the factors of speed and turn. `positional`: keys are places on the keyboard rather than
-    letters, where the terminal reports the place.
+    `speeds` holds the factors of speed and turn. `positional`: keys are places on the keyboard
+    rather than letters, where the terminal reports the place.
     """
 
     name: str
@@ -149,19 +195,34 @@ class Layout(Struct, frozen=True, dict=True):
     positional: bool = False
 
     def meanings(self) -> list[tuple[list[str], str]]:
-        """(keys, meaning) of everything in display order: motions from simple to combined, speeds, actions."""
+        """(keys, meaning) of everything in display order: motions from simple to combined, speeds,
+        actions.
+        """
         order = sorted(dict.fromkeys(self.moves.values()), key=_simple_first)
         found = [(_keys(self.moves, direction), _motion(direction)) for direction in order]
-        found += [(_keys(self.speeds, factors), _change(factors)) for factors in dict.fromkeys(self.speeds.values())]
+        found += [
+            (_keys(self.speeds, factors), _change(factors))
+            for factors in dict.fromkeys(self.speeds.values())
+        ]
         return found + [
-            (keys, words) for action, words in ACTION_WORDS.items() if (keys := _keys(self.actions, action))
+            (keys, words)
+            for action, words in ACTION_WORDS.items()
+            if (keys := _keys(self.actions, action))
         ]
 
     @cached_property
     def help(self) -> list[str]:
-        """The first key for each motion and speed, opposites together, in lines of at most 40 columns."""
-        items = [f"{keys} {meaning}" for keys, meaning in [*_pairs(self.moves), *_speeds(self.speeds)]]
-        items += [f"{keys[0]} {ACTION_WORDS[action]}" for action in SHORT if (keys := _keys(self.actions, action))]
+        """The first key for each motion and speed, opposites together, in lines of at most 40
+        columns.
+        """
+        items = [
+            f"{keys} {meaning}" for keys, meaning in [*_pairs(self.moves), *_speeds(self.speeds)]
+        ]
+        items += [
+            f"{keys[0]} {ACTION_WORDS[action]}"
+            for action in SHORT
+            if (keys := _keys(self.actions, action))
+        ]
         lines: list[str] = []
         for item in [*items, f"{OTHER} stop"]:
             if lines and len(f"{lines[-1]}{GAP}{item}") <= WIDTH:
@@ -180,15 +241,21 @@ class Layout(Struct, frozen=True, dict=True):
         return lines
 
     def key_for(self, typed: str, base: str) -> str:
-        """The key of this layout that was pressed. `typed` is what it types, `base` what the same place types on a US
-        keyboard, with shift applied, or "" if the terminal does not report it.
+        """The key of this layout that was pressed. `typed` is what it types, `base` what the same
+        place types on a US keyboard, with shift applied, or "" if the terminal does not report it.
 
-        Fixed keys count by what they type, and so do symbols in a positional layout that has nothing at their place. On
-        a keyboard for another script no letter of a layout can be typed, so the place counts in every layout.
+        Fixed keys count by what they type, and so do symbols in a positional layout that has
+        nothing at their place. On a keyboard for another script no letter of a layout can be typed,
+        so the place counts in every layout.
         """
         if typed in FIXED:
             return typed
-        if self.positional and base and base not in FIXED and (base in self or (len(typed) == 1 and typed.isalpha())):
+        if (
+            self.positional
+            and base
+            and base not in FIXED
+            and (base in self or (len(typed) == 1 and typed.isalpha()))
+        ):
             return base
         if typed in self or not base:
             return typed
@@ -205,43 +272,71 @@ TURN_LEFT, TURN_RIGHT = (0, 0, 0, 1), (0, 0, 0, -1)
 
 # With shift held for strafing, the other arrows keep their meaning.
 ARROWS: dict[str, Direction] = {
-    "up": FORWARD, "down": BACK, "left": TURN_LEFT, "right": TURN_RIGHT,
-    "shift+up": FORWARD, "shift+down": BACK, "shift+left": LEFT, "shift+right": RIGHT,
-}  # fmt: skip
+    "up": FORWARD,
+    "down": BACK,
+    "left": TURN_LEFT,
+    "right": TURN_RIGHT,
+    "shift+up": FORWARD,
+    "shift+down": BACK,
+    "shift+left": LEFT,
+    "shift+right": RIGHT,
+}
 
 TTK = Layout(
     name="ttk",
     moves={
-        "u": (1, 0, 0, 1), "i": FORWARD, "o": (1, 0, 0, -1),
-        "j": TURN_LEFT, "l": TURN_RIGHT,
-        "m": (-1, 0, 0, -1), ",": BACK, ".": (-1, 0, 0, 1),
-        "U": (1, 1, 0, 0), "I": FORWARD, "O": (1, -1, 0, 0),
-        "J": LEFT, "L": RIGHT,
-        "M": (-1, 1, 0, 0), "<": BACK, ">": (-1, -1, 0, 0),
-        "t": (0, 0, 1, 0), "b": (0, 0, -1, 0),
+        "u": (1, 0, 0, 1),
+        "i": FORWARD,
+        "o": (1, 0, 0, -1),
+        "j": TURN_LEFT,
+        "l": TURN_RIGHT,
+        "m": (-1, 0, 0, -1),
+        ",": BACK,
+        ".": (-1, 0, 0, 1),
+        "U": (1, 1, 0, 0),
+        "I": FORWARD,
+        "O": (1, -1, 0, 0),
+        "J": LEFT,
+        "L": RIGHT,
+        "M": (-1, 1, 0, 0),
+        "<": BACK,
+        ">": (-1, -1, 0, 0),
+        "t": (0, 0, 1, 0),
+        "b": (0, 0, -1, 0),
         **ARROWS,
     },
     speeds={
-        "q": (1.1, 1.1), "z": (0.9, 0.9),
-        "w": (1.1, 1.0), "x": (0.9, 1.0),
-        "e": (1.0, 1.1), "c": (1.0, 0.9),
+        "q": (1.1, 1.1),
+        "z": (0.9, 0.9),
+        "w": (1.1, 1.0),
+        "x": (0.9, 1.0),
+        "e": (1.0, 1.1),
+        "c": (1.0, 0.9),
     },
     actions={**FIXED, "k": "stop", "K": "stop", "r": "resume"},
-)  # fmt: skip
+)
 
 _WASD: dict[str, Direction] = {
-    "w": FORWARD, "s": BACK, "a": LEFT, "d": RIGHT, "q": TURN_LEFT, "e": TURN_RIGHT,
-}  # fmt: skip
+    "w": FORWARD,
+    "s": BACK,
+    "a": LEFT,
+    "d": RIGHT,
+    "q": TURN_LEFT,
+    "e": TURN_RIGHT,
+}
 _PLUS_MINUS = {"+": (1.1, 1.1), "=": (1.1, 1.1), "-": (0.9, 0.9)}
 
 WASD = Layout(
     name="wasd",
-    moves={**_WASD, **{key.upper(): direction for key, direction in _WASD.items()}},  # also with caps lock
+    # also with caps lock
+    moves={**_WASD, **{key.upper(): direction for key, direction in _WASD.items()}},
     speeds=_PLUS_MINUS,
     actions={**FIXED, "r": "resume", "R": "resume"},
     positional=True,
 )
 
-ARROW_KEYS = Layout(name="arrows", moves=ARROWS, speeds=_PLUS_MINUS, actions={**FIXED, "r": "resume"})
+ARROW_KEYS = Layout(
+    name="arrows", moves=ARROWS, speeds=_PLUS_MINUS, actions={**FIXED, "r": "resume"}
+)
 
 LAYOUTS = {layout.name: layout for layout in (TTK, WASD, ARROW_KEYS)}

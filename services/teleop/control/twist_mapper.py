@@ -12,18 +12,20 @@ from ..input.kitty import Key
 from .key_state import HOLD, KeyState
 from .layouts import Direction, Layout
 
-Motion = tuple[float, float, float, float]
-"""Forward, left, up, counter-clockwise: each is from -1 to 1, to be multiplied by the speed, the last by the turn."""
+Deflection = tuple[float, float, float, float]
+"""Forward, left, up, counter-clockwise: each is from -1 to 1, to be multiplied by the speed, the
+last by the turn.
+"""
 
-STILL: Motion = (0.0, 0.0, 0.0, 0.0)
+STILL: Deflection = (0.0, 0.0, 0.0, 0.0)
 STOP_FOR = 1.0  # s; a stop is repeated until the robot is at rest, but no longer than this
 DEAD_MAN = "space"
 PIECES = ("unknown", "escape")  # may be parts of a repeating key on a slow line
 
 
 class Settings(Struct, frozen=True):
-    """The parameters of teleop_twist_keyboard, in m/s, rad/s, Hz and s. With a `key_timeout` of None a key counts while
-    the terminal repeats it.
+    """The parameters of teleop_twist_keyboard, in m/s, rad/s, Hz and s. With a `key_timeout` of
+    None a key counts while the terminal repeats it.
     """
 
     speed: float = 0.5
@@ -37,22 +39,27 @@ class Settings(Struct, frozen=True):
 
 
 class TwistMapper:
-    """Decides what to publish: a command while keys drive, then a stop until the robot is at rest, then nothing."""
+    """Decides what to publish: a command while keys drive, then a stop until the robot is at rest,
+    then nothing.
+    """
 
     def __init__(self, settings: Settings, layout: Layout) -> None:
         self.settings = replace(
-            settings, speed=min(settings.speed, settings.speed_limit), turn=min(settings.turn, settings.turn_limit)
+            settings,
+            speed=min(settings.speed, settings.speed_limit),
+            turn=min(settings.turn, settings.turn_limit),
         )
         self.layout = layout
         self.key_state = KeyState(settings.mode, settings.key_timeout)
-        self.stick: tuple[float, float, float] = (0.0, 0.0, 0.0)  # the joystick: forward, left, counter-clockwise
+        # the joystick: forward, left, counter-clockwise
+        self.stick: tuple[float, float, float] = (0.0, 0.0, 0.0)
         self.note = ""
         self._stopping: float | None = None  # when the stop in progress began
         self._speeds: dict[str, tuple[float, float]] = {}  # of the other robots
         self._robot = ""
 
     @property
-    def motion(self) -> Motion:
+    def motion(self) -> Deflection:
         """The combined motion of the held keys, or without any that of the joystick."""
         keys = self.key_state.keys
         if self.settings.deadman and DEAD_MAN not in keys and keys:
@@ -71,7 +78,9 @@ class TwistMapper:
         return self.layout.key_for(key.name, key.base)
 
     def take(self, key: Key, now: float) -> str:
-        """Take a key event. Returns the requested action, such as "resume", or "". Unknown keys stop the robot."""
+        """Take a key event. Returns the requested action, such as "resume", or "". Unknown keys
+        stop the robot.
+        """
         name = self.key(key)
         if key.kind == "release":
             return self._moved(lambda: self.key_state.release(key.code), now)
@@ -117,14 +126,20 @@ class TwistMapper:
         turn = speed if turn is None else turn
         now = self.settings
         wanted = now.speed * speed, now.turn * turn
-        self.settings = replace(now, speed=min(now.speed_limit, wanted[0]), turn=min(now.turn_limit, wanted[1]))
+        self.settings = replace(
+            now, speed=min(now.speed_limit, wanted[0]), turn=min(now.turn_limit, wanted[1])
+        )
         over = [
-            name for name, value in zip(("speed", "turn"), wanted, strict=True) if value > getattr(now, f"{name}_limit")
+            name
+            for name, value in zip(("speed", "turn"), wanted, strict=True)
+            if value > getattr(now, f"{name}_limit")
         ]
         self.note = f"limit of {' and '.join(over)} reached" if over else ""
 
     def command(self, now: float, rests: bool) -> Twist | None:
-        """The command to publish at `now`, or None. `rests`: an odom after the stop shows no motion."""
+        """The command to publish at `now`, or None. `rests`: an odom after the stop shows no
+        motion.
+        """
         self.expire(now)
         if self._stopping is not None and (now - self._stopping > STOP_FOR or rests):
             self._stopping = None
@@ -174,11 +189,15 @@ class TwistMapper:
     def _twist(self) -> Twist:
         x, y, z, turn = self.motion
         speed = self.settings.speed
-        return Twist(Vector3(x * speed, y * speed, z * speed), Vector3(0.0, 0.0, turn * self.settings.turn))
+        return Twist(
+            Vector3(x * speed, y * speed, z * speed), Vector3(0.0, 0.0, turn * self.settings.turn)
+        )
 
 
-def combined(moves: list[Direction]) -> Motion:
-    """The sum of several keys' motions, no faster in the plane than one of them. A single key counts unchanged."""
+def combined(moves: list[Direction]) -> Deflection:
+    """The sum of several keys' motions, no faster in the plane than one of them. A single key
+    counts unchanged.
+    """
     x, y, z, turn = (max(-1.0, min(1.0, float(sum(axis)))) for axis in zip(*moves, strict=True))
     scale = max(1.0, math.hypot(x, y)) if len(moves) > 1 else 1.0
     return x / scale, y / scale, z, turn

@@ -1,7 +1,8 @@
 """A Linux gamepad: its direction and its buttons.
 
-The few structs and ioctls of linux/input.h, a stable interface of the kernel, are decoded here, so that nothing has to
-be compiled or installed. Button and axis codes are those of the kernel's gamepad specification.
+The few structs and ioctls of linux/input.h, a stable interface of the kernel, are decoded here, so
+that nothing has to be compiled or installed. Button and axis codes are those of the kernel's
+gamepad specification.
 """
 
 import contextlib
@@ -24,8 +25,10 @@ Event = tuple[int, int, int]
 Range = tuple[int, int]
 """The lowest and highest value of an axis."""
 
-EVENT = struct.Struct("llHHi")  # struct input_event: two of time, then type, code, value; 24 bytes on 64-bit machines
-_ABSINFO = struct.Struct("6i")  # struct input_absinfo: value, minimum, maximum, fuzz, flat, resolution
+# struct input_event: two of time, then type, code, value; 24 bytes on 64-bit machines
+EVENT = struct.Struct("llHHi")
+# struct input_absinfo: value, minimum, maximum, fuzz, flat, resolution
+_ABSINFO = struct.Struct("6i")
 _KEY_BYTES, _ABS_BYTES, _NAME_BYTES = 96, 8, 256  # for KEY_CNT and ABS_CNT bits, and for a name
 _AT_ONCE = 64  # events
 
@@ -43,7 +46,9 @@ GET_AXIS = request(0x40, _ABSINFO.size)  # EVIOCGABS, plus the axis
 
 
 class Device:
-    """An open input device. Every method raises OSError if it is unplugged or not an input device."""
+    """An open input device. Every method raises OSError if it is unplugged or not an input
+    device.
+    """
 
     def __init__(self, path: str) -> None:
         self._number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
@@ -101,7 +106,9 @@ class Device:
 
 
 def _bits(found: bytes) -> set[int]:
-    return {8 * index + bit for index, byte in enumerate(found) for bit in range(8) if byte >> bit & 1}
+    return {
+        8 * index + bit for index, byte in enumerate(found) for bit in range(8) if byte >> bit & 1
+    }
 
 
 ABS_X, ABS_Y, ABS_RX, ABS_HAT0Y = 0x00, 0x01, 0x03, 0x11
@@ -116,15 +123,18 @@ PRESSES = {BTN_START: "resume", BTN_DPAD_UP: "faster", BTN_DPAD_DOWN: "slower"}
 DEAD_ZONE = 0.15  # of a stick's travel, since worn sticks do not rest at zero
 
 Deflection = tuple[float, float, float]
-"""Forward, left, counter-clockwise: each from -1 to 1, and the vector of the first two at most 1 long."""
+"""Forward, left, counter-clockwise: each from -1 to 1, and the vector of the first two at most 1
+long.
+"""
 REST: Deflection = (0.0, 0.0, 0.0)
 
 
 class Gamepad:
-    """The state of a gamepad's sticks and buttons. `ranges` are those of the axes in AXES, each with low < high.
+    """The state of a gamepad's sticks and buttons. `ranges` are those of the axes in AXES, each
+    with low < high.
 
-    It has a direction only while the dead-man is held, and only after that was seen released: a button that is stuck,
-    or held from the start, does not drive.
+    It has a direction only while the dead-man is held, and only after that was seen released: a
+    button that is stuck, or held from the start, does not drive.
     """
 
     def __init__(self, ranges: Mapping[int, Range]) -> None:
@@ -132,7 +142,8 @@ class Gamepad:
         self._values: dict[int, int] = {}
         self._hat = 0
         self._armed = self._held = False
-        self.lost = False  # whether events were lost: until the state is read again, events are ignored
+        # whether events were lost: until the state is read again, events are ignored
+        self.lost = False
 
     def begin(self, values: Mapping[int, int], down: AbstractSet[int]) -> None:
         """Restart from the current axis values and pressed buttons."""
@@ -186,7 +197,9 @@ class Gamepad:
 
 
 def stick(x: float, y: float) -> tuple[float, float]:
-    """A stick's deflection without the dead zone: in the same direction, from 0 at the zone's edge to 1."""
+    """A stick's deflection without the dead zone: in the same direction, from 0 at the zone's edge
+    to 1.
+    """
     length = math.hypot(x, y)
     if length <= DEAD_ZONE:
         return 0.0, 0.0
@@ -212,7 +225,9 @@ class _Forbidden(JoystickError):
 
 
 class Joystick:
-    """An open gamepad, to be closed by `with`. The left shoulder button is the dead-man: nothing moves without it."""
+    """An open gamepad, to be closed by `with`. The left shoulder button is the dead-man: nothing
+    moves without it.
+    """
 
     def __init__(self, device: Device, path: str) -> None:
         """Take an open device. Raises OSError, and JoystickError if it is not a gamepad."""
@@ -221,18 +236,24 @@ class Joystick:
         axes = device.axes()
         missing = _missing(axes, device.keys())
         if missing:
-            raise JoystickError(f"joystick {path}: {self.name!r} is not a gamepad: it has no {', '.join(missing)}")
+            raise JoystickError(
+                f"joystick {path}: {self.name!r} is not a gamepad: it has no {', '.join(missing)}"
+            )
         self._axes = [axis for axis in (*AXES, ABS_HAT0Y) if axis in axes]
         ranges = {axis: device.axis(axis)[1] for axis in AXES}
         for axis, (low, high) in ranges.items():
             if low >= high:
-                raise JoystickError(f"joystick {path}: {self.name!r} has no range for {AXES[axis]}: {low} to {high}")
+                raise JoystickError(
+                    f"joystick {path}: {self.name!r} has no range for {AXES[axis]}: {low} to {high}"
+                )
         self._pad = Gamepad(ranges)
         self._begin()
 
     @classmethod
     def open(cls, device: str) -> "Joystick":
-        """The gamepad at a path such as /dev/input/event7, or the first one if that is "". Raises JoystickError."""
+        """The gamepad at a path such as /dev/input/event7, or the first one if that is "". Raises
+        JoystickError.
+        """
         return cls._at(device) if device else cls._first(FOLDER)
 
     def __enter__(self) -> "Joystick":
@@ -252,7 +273,9 @@ class Joystick:
 
     @property
     def direction(self) -> Deflection:
-        """Forward, left, counter-clockwise (-1 to 1) at the last `read`; zeros unless the dead-man is held."""
+        """Forward, left, counter-clockwise (-1 to 1) at the last `read`; zeros unless the dead-man
+        is held.
+        """
         return self._pad.direction
 
     def let_go(self) -> None:
@@ -268,7 +291,8 @@ class Joystick:
             self._begin()
 
     def read(self) -> list[str]:
-        """Take the pending events, without blocking. Returns the requested actions: "resume", "faster", "slower".
+        """Take the pending events, without blocking. Returns the requested actions: "resume",
+        "faster", "slower".
 
         Raises JoystickError if it is gone; `direction` is zero from then on.
         """
@@ -301,19 +325,25 @@ class Joystick:
         except PermissionError:
             raise _Forbidden(f"joystick {path}: no permission; {GROUP}") from None
         except (OSError, ValueError) as error:
-            raise JoystickError(f"joystick {path}: {getattr(error, 'strerror', None) or error}") from None
+            raise JoystickError(
+                f"joystick {path}: {getattr(error, 'strerror', None) or error}"
+            ) from None
         with contextlib.ExitStack() as stack:
             stack.callback(device.close)
             try:
                 made = cls(device, path)
             except OSError:
-                raise JoystickError(f"joystick {path}: is not an input device; use one of {FOLDER}/event*") from None
+                raise JoystickError(
+                    f"joystick {path}: is not an input device; use one of {FOLDER}/event*"
+                ) from None
             stack.pop_all()
             return made
 
     @classmethod
     def _first(cls, folder: str) -> "Joystick":
-        """The first gamepad in a folder. Raises JoystickError, which describes the devices found."""
+        """The first gamepad in a folder. Raises JoystickError, which describes the devices
+        found.
+        """
         paths = _devices(folder)
         closed = 0
         for path in paths:
@@ -324,8 +354,11 @@ class Joystick:
         if not paths:
             raise JoystickError(f"joystick: no gamepad: there are no input devices in {folder}")
         if closed:
-            raise JoystickError(f"joystick: no gamepad found, but {closed} of {len(paths)} devices in {folder} "
-                                f"may not be read; {GROUP}")  # fmt: skip
+            raise JoystickError(
+                f"joystick: no gamepad found, but {closed} of {len(paths)} "
+                f"devices in {folder} "
+                f"may not be read; {GROUP}"
+            )
         raise JoystickError(f"joystick: none of the {len(paths)} devices in {folder} is a gamepad")
 
 

@@ -1,8 +1,9 @@
-"""Parses a terminal's input into events: keys, replies to queries, focus. Pure: bytes and times in, events out.
+"""Parses a terminal's input into events: keys, replies to queries, focus. Pure: bytes and times in,
+events out.
 
 It parses the traditional sequences and the Kitty keyboard protocol, which also reports releases
-(sw.kovidgoyal.net/kitty/keyboard-protocol). An unknown sequence becomes one `Unknown`, so that none of its letters is
-taken for a key.
+(sw.kovidgoyal.net/kitty/keyboard-protocol). An unknown sequence becomes one `Unknown`, so that none
+of its letters is taken for a key.
 """
 
 import math
@@ -12,9 +13,9 @@ from typing import NamedTuple
 
 
 class Key(NamedTuple):
-    """A key event. `name` is what the key types ("i", "I", "space", "shift+left", "ctrl+c"), `base` what its place
-    types on a US keyboard ("" if unknown). `kind` is "press", "repeat" or "release", and `code` identifies the key; or
-    "typed" if the terminal reports no releases.
+    """A key event. `name` is what the key types ("i", "I", "space", "shift+left", "ctrl+c"), `base`
+    what its place types on a US keyboard ("" if unknown). `kind` is "press", "repeat" or "release",
+    and `code` identifies the key; or "typed" if the terminal reports no releases.
     """
 
     name: str
@@ -29,14 +30,55 @@ class Unknown(NamedTuple):
     text: str
 
 
-FINALS = {"A": "up", "B": "down", "C": "right", "D": "left", "H": "home", "F": "end", "E": "begin",
-           "P": "f1", "Q": "f2", "R": "f3", "S": "f4"}  # fmt: skip
-NUMBERS = {1: "home", 2: "insert", 3: "delete", 4: "end", 5: "pageup", 6: "pagedown", 7: "home", 8: "end",
-           11: "f1", 12: "f2", 13: "f3", 14: "f4", 15: "f5", 17: "f6", 18: "f7", 19: "f8", 20: "f9", 21: "f10",
-           23: "f11", 24: "f12"}  # fmt: skip
+FINALS = {
+    "A": "up",
+    "B": "down",
+    "C": "right",
+    "D": "left",
+    "H": "home",
+    "F": "end",
+    "E": "begin",
+    "P": "f1",
+    "Q": "f2",
+    "R": "f3",
+    "S": "f4",
+}
+NUMBERS = {
+    1: "home",
+    2: "insert",
+    3: "delete",
+    4: "end",
+    5: "pageup",
+    6: "pagedown",
+    7: "home",
+    8: "end",
+    11: "f1",
+    12: "f2",
+    13: "f3",
+    14: "f4",
+    15: "f5",
+    17: "f6",
+    18: "f7",
+    19: "f8",
+    20: "f9",
+    21: "f10",
+    23: "f11",
+    24: "f12",
+}
 CODES = {9: "tab", 13: "enter", 27: "escape", 32: "space", 127: "backspace"}
-KEYPAD = {57414: "enter", 57417: "left", 57418: "right", 57419: "up", 57420: "down", 57421: "pageup",
-          57422: "pagedown", 57423: "home", 57424: "end", 57425: "insert", 57426: "delete"}  # fmt: skip
+KEYPAD = {
+    57414: "enter",
+    57417: "left",
+    57418: "right",
+    57419: "up",
+    57420: "down",
+    57421: "pageup",
+    57422: "pagedown",
+    57423: "home",
+    57424: "end",
+    57425: "insert",
+    57426: "delete",
+}
 KEYPAD_TYPES = dict(zip(range(57399, 57414), "0123456789./*-+", strict=True))
 SILENT = {*range(57358, 57364), *range(57441, 57455)}  # modifiers such as Shift, Ctrl and Caps Lock
 SHIFTED_FINALS = {"a": "up", "b": "down", "c": "right", "d": "left"}  # rxvt's encoding of Shift
@@ -76,7 +118,8 @@ def _kitty(codes: list[int], modifiers: int, kind: str) -> Key | Unknown | None:
             place = name  # Ctrl combinations count by the letter, not the place
     else:
         return Unknown(f"key {code}")
-    return Key(name, place, kind, str(base or codes[0]))  # by place: the layout may change before the release
+    # by place: the layout may change before the release
+    return Key(name, place, kind, str(base or codes[0]))
 
 
 def _typed(text: str, shifted: str, modifiers: int) -> str:
@@ -89,19 +132,23 @@ def _typed(text: str, shifted: str, modifiers: int) -> str:
 
 
 def _with(modifiers: int, name: str) -> str:
-    held = [word for bit, word in ((CTRL, "ctrl"), (ALT, "alt"), (SUPER, "super"), (SHIFT, "shift")) if modifiers & bit]
+    held = [
+        word
+        for bit, word in ((CTRL, "ctrl"), (ALT, "alt"), (SUPER, "super"), (SHIFT, "shift"))
+        if modifiers & bit
+    ]
     return "+".join([*held, name])
 
 
 ESCAPE_WAIT = 0.05  # s after which an Escape is the key, and not the start of a sequence
 LATE = 0.5  # s within which the rest of a sequence may arrive on a slow line
 LONG_PASTE = 10.0  # s without a byte after which an unfinished paste is given up
-LONGEST = 4096  # bytes; longer sequences are discarded
+MAX_SEQUENCE = 4096  # bytes; longer sequences are discarded
 
 
 class Answer(NamedTuple):
-    """A reply of the terminal. `to` is the query: "keyboard" (it supports the Kitty protocol, and has these flags on),
-    "terminal" (its identity) or "alive".
+    """A reply of the terminal. `to` is the query: "keyboard" (it supports the Kitty protocol, and
+    has these flags on), "terminal" (its identity) or "alive".
     """
 
     to: str
@@ -128,8 +175,8 @@ OPEN_PASTE = b"\x1b[200~"
 
 
 class Keyboard:
-    """Parses the input of a terminal; times in seconds. `releases`: the terminal reports key releases, so an event
-    without a kind is a press.
+    """Parses the input of a terminal; times in seconds. `releases`: the terminal reports key
+    releases, so an event without a kind is a press.
     """
 
     def __init__(self) -> None:
@@ -147,7 +194,9 @@ class Keyboard:
         return list(self._events())
 
     def wait(self, now: float) -> list[Event]:
-        """The events that are complete since nothing more has arrived: a lone Escape, or an unfinished sequence."""
+        """The events that are complete since nothing more has arrived: a lone Escape, or an
+        unfinished sequence.
+        """
         silent = now - self._since
         if self.rest == b"\x1b" and silent >= ESCAPE_WAIT:
             self.rest, self._escaped = b"", now
@@ -167,8 +216,12 @@ class Keyboard:
         while self.rest:
             found = _split(self.rest, self.releases)
             if found is None:
-                if len(self.rest) > LONGEST:
-                    self.rest = OPEN_PASTE + self.rest[-6:] if self.rest.startswith(OPEN_PASTE) else self.rest[:2]
+                if len(self.rest) > MAX_SEQUENCE:
+                    self.rest = (
+                        OPEN_PASTE + self.rest[-6:]
+                        if self.rest.startswith(OPEN_PASTE)
+                        else self.rest[:2]
+                    )
                 return
             event, length = found
             self.rest = self.rest[length:]
@@ -184,7 +237,9 @@ def _patience(rest: bytes) -> float:
 
 
 def _split(data: bytes, releases: bool) -> tuple[Event | None, int] | None:
-    """The first event of `data` (None: to be ignored) and its number of bytes; None if it is incomplete."""
+    """The first event of `data` (None: to be ignored) and its number of bytes; None if it is
+    incomplete.
+    """
     if data[0] != 0x1B:
         return _character(data)
     if match := PASTE.match(data) or STRING.match(data):
@@ -204,7 +259,9 @@ def _split(data: bytes, releases: bool) -> tuple[Event | None, int] | None:
 
 
 def _after_escape(data: bytes) -> tuple[Event | None, int] | None:
-    """The event of an Escape that starts no known sequence: a character with Alt, two Escapes, an aborted sequence."""
+    """The event of an Escape that starts no known sequence: a character with Alt, two Escapes, an
+    aborted sequence.
+    """
     if data[1] == 0x1B:
         return Key("escape"), 1
     if data[1] == 0x5B:
@@ -243,7 +300,10 @@ def _control(parameters: str, final: str, releases: bool) -> Event | None:
     if parameters.startswith("?"):
         flags = parameters[1:]
         return (
-            Answer({"u": "keyboard", "c": "terminal"}[final], int(flags[:9]) if flags.isdecimal() else 0)
+            Answer(
+                {"u": "keyboard", "c": "terminal"}[final],
+                int(flags[:9]) if flags.isdecimal() else 0,
+            )
             if final in "uc"
             else None
         )

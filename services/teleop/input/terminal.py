@@ -10,17 +10,22 @@ from typing import Any, Self
 
 from holozen.terminal import ASK_KEYBOARD, ASK_TERMINAL
 
-FULL = "\x1b[?1049h\x1b[?25l\x1b[H", "\x1b[m\x1b[?7h\x1b[?25h\x1b[?1049l"  # the alternate screen without a cursor
-REPORTS = "\x1b[?2004h\x1b[?1004h", "\x1b[?1004l\x1b[?2004l"  # brackets around pastes, and reports of focus changes
+# the alternate screen without a cursor
+FULL = ("\x1b[?1049h\x1b[?25l\x1b[H", "\x1b[m\x1b[?7h\x1b[?25h\x1b[?1049l")
+# brackets around pastes, and reports of focus changes
+REPORTS = ("\x1b[?2004h\x1b[?1004h", "\x1b[?1004l\x1b[?2004l")
 ASK_ALIVE = "\x1b[5n"
-# The Kitty protocol, with unambiguous codes, releases, the key's place on a US keyboard, for all keys.
+# The Kitty protocol, with unambiguous codes, releases, the key's place on a US keyboard, for all
+# keys.
 RELEASES_ON, RELEASES_SET, RELEASES_OFF = "\x1b[>15u", "\x1b[=15;1u", "\x1b[<u"
 FAREWELL = 0.1  # s to wait at the end for pending replies, which would else reach the shell
 MAX_READ = 65536  # bytes read at once
 
 
 class Terminal:
-    """A terminal, set up in a `with` block: stdin's, or that of `fileno`. `full`: on the alternate screen."""
+    """A terminal, set up in a `with` block: stdin's, or that of `fileno`. `full`: on the alternate
+    screen.
+    """
 
     def __init__(self, full: bool = True, fileno: int | None = None) -> None:
         self.releases = False  # whether it has been asked to report key releases
@@ -47,15 +52,22 @@ class Terminal:
         if not self._before:
             self._before = termios.tcgetattr(self._in)
         modes = termios.tcgetattr(self._in)
-        modes[0] &= ~(termios.IXON | termios.ICRNL | termios.INLCR | termios.IGNCR | termios.ISTRIP | termios.BRKINT)
+        modes[0] &= ~(
+            termios.IXON
+            | termios.ICRNL
+            | termios.INLCR
+            | termios.IGNCR
+            | termios.ISTRIP
+            | termios.BRKINT
+        )
         modes[3] &= ~(termios.ICANON | termios.ECHO | termios.ISIG | termios.IEXTEN)
         modes[6][termios.VMIN], modes[6][termios.VTIME] = 1, 0
         termios.tcsetattr(self._in, termios.TCSAFLUSH, modes)
         self.greet()
 
     def greet(self) -> None:
-        """Set up screen and reports, and query the terminal's identity, which may have changed. Does nothing after
-        `leave`, when a late signal may call it: the terminal is the shell's.
+        """Set up screen and reports, and query the terminal's identity, which may have changed.
+        Does nothing after `leave`, when a late signal may call it: the terminal is the shell's.
         """
         if not self._before:
             return
@@ -67,7 +79,11 @@ class Terminal:
         if not self._before:
             return
         with contextlib.suppress(OSError, termios.error):
-            self.write((RELEASES_OFF if self.releases else "") + REPORTS[1] + (FULL[1] if self._full else ""))
+            self.write(
+                (RELEASES_OFF if self.releases else "")
+                + REPORTS[1]
+                + (FULL[1] if self._full else "")
+            )
             self._flush(time.monotonic() + FAREWELL)
             self._hear_answers(time.monotonic() + FAREWELL)
             termios.tcsetattr(self._in, termios.TCSAFLUSH, self._before)
@@ -78,7 +94,9 @@ class Terminal:
         return self._in
 
     def read(self) -> bytes:
-        """The available input; blocks until there is some. Raises OSError if the terminal is gone."""
+        """The available input; blocks until there is some. Raises OSError if the terminal is
+        gone.
+        """
         if not (data := os.read(self._in, MAX_READ)):
             raise OSError("the terminal was closed")
         return data
@@ -107,7 +125,9 @@ class Terminal:
         self.releases = False
 
     def write(self, text: str) -> None:
-        """Write text without blocking; the part that the terminal does not accept now is sent later."""
+        """Write text without blocking; the part that the terminal does not accept now is sent
+        later.
+        """
         self._unsent += text.encode()
         self.ready()
 
@@ -140,7 +160,9 @@ class Terminal:
 
 
 def _writer(fileno: int) -> int:
-    """A descriptor of the same terminal that never blocks; the shell shares the given one, and needs it to block."""
+    """A descriptor of the same terminal that never blocks; the shell shares the given one, and
+    needs it to block.
+    """
     try:
         return os.open(os.ttyname(fileno), os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
     except OSError:

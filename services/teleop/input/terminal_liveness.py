@@ -1,17 +1,16 @@
 """Whether the terminal, and the operator at it, can still be reached.
 
-Where the terminal reports releases a held key sends nothing, and a latched key is never repeated: if the connection to
-the terminal broke, the robot would keep driving. So the terminal is polled, and a missing reply stops the robot. tmux
-and screen reply even while they are detached, but their socket is executable only while a client is attached. They also
-reply while the line to an attached client hangs, which nothing shows: there a latched key has to be pressed again and
-again.
+Where the terminal reports releases a held key sends nothing, and a latched key is never repeated:
+if the connection to the terminal broke, the robot would keep driving. So the terminal is polled,
+and a missing reply stops the robot. tmux and screen reply even while they are detached, but their
+socket is executable only while a client is attached. They also reply while the line to an attached
+client hangs, which nothing shows: there a latched key has to be pressed again and again.
 
-A terminal that hung delivers, once it is back, buffered keys and replies to earlier queries, in any order. Keys count
-again once it has replied in time to queries sent after that. It replies in the order of the queries, so the replies to
-earlier ones are discounted first.
+A terminal that hung delivers, once it is back, buffered keys and replies to earlier queries, in any
+order. Keys count again once it has replied in time to queries sent after that. It replies in the
+order of the queries, so the replies to earlier ones are discounted first.
 """
 
-import math
 import os
 import time
 from collections import deque
@@ -29,7 +28,9 @@ MUTE = "a terminal that does not answer"
 
 
 def attached(environ: Mapping[str, str] = os.environ) -> Callable[[], bool]:
-    """A function that tells whether an operator may be attached; it always does outside of tmux and screen."""
+    """A function that tells whether an operator may be attached; it always does outside of tmux and
+    screen.
+    """
     socket = _socket(environ)
     if socket is None or not socket.exists():
         return lambda: True
@@ -44,7 +45,8 @@ def attached(environ: Mapping[str, str] = os.environ) -> Callable[[], bool]:
 
 
 def multiplexer(environ: Mapping[str, str] = os.environ) -> str:
-    """The multiplexer between this program and the operator's terminal: "tmux", "screen", or "" if none is known.
+    """The multiplexer between this program and the operator's terminal: "tmux", "screen", or "" if
+    none is known.
 
     Over ssh only TERM shows it, and many a tmux has screen's.
     """
@@ -57,7 +59,11 @@ def _socket(environ: Mapping[str, str]) -> Path | None:
     if path := environ.get("TMUX", "").partition(",")[0]:
         return Path(path)
     if name := environ.get("STY"):
-        folders = [environ["SCREENDIR"]] if environ.get("SCREENDIR") else [f"{at}/S-{_user(environ)}" for at in FOLDERS]
+        folders = (
+            [environ["SCREENDIR"]]
+            if environ.get("SCREENDIR")
+            else [f"{at}/S-{_user(environ)}" for at in FOLDERS]
+        )
         return next((Path(at) / name for at in folders if (Path(at) / name).exists()), None)
     return None
 
@@ -67,9 +73,11 @@ def _user(environ: Mapping[str, str]) -> str:
 
 
 EVERY, IDLE = 0.05, 0.5  # s between two queries, while driving and while not
-LIMIT = 0.4  # s for a reply; LIMIT and EVERY together are less than the half second in which a robot must stop
+# s for a reply; LIMIT and EVERY together are less than the half second in which a robot must stop
+LIMIT = 0.4
 RETRY = 2.0  # s from a missed reply to the next query, doubled each time after that
-ROUNDS = 2  # consecutive replies in time after which it is back; by then it has delivered its buffered keys
+# consecutive replies in time after which it is back; by then it has delivered its buffered keys
+ROUNDS = 2
 
 
 class Heartbeat:
@@ -79,22 +87,28 @@ class Heartbeat:
         self.answers = False  # whether this terminal is known to reply
         self.lost = False  # whether a reply was overdue, and the terminal is not yet back
         self._asked: deque[float] = deque()  # times of the queries without a reply
-        self._last = 0.0  # time of the last query
+        self._last: float | None = 0.0  # time of the last query; None: the next one is due now
         self._lost_at = 0.0
         self._sent = self._heard = 0  # identity queries, and replies to them
         self._old = 0  # replies that may belong to queries from before there was input again
-        self._probed: float | None = None  # time of the query after there was input again; None before
+        # time of the query after there was input again; None before
+        self._probed: float | None = None
         self._rounds = 0  # such queries in a row with a reply in time
 
     def due(self, now: float, drives: bool) -> bool:
         """Whether to send a query now."""
-        wait = max(RETRY, self._last - self._lost_at) if self.lost else EVERY if drives else IDLE
-        if not self.answers or now - self._last < wait:
+        if not self.answers or (self._last is not None and now - self._last < self._wait(drives)):
             return False
         if not self.lost:
             self._asked.append(now)
         self._last = now
         return True
+
+    def _wait(self, drives: bool) -> float:
+        """The time from the last query to the next one."""
+        if self.lost and self._last is not None:
+            return max(RETRY, self._last - self._lost_at)
+        return EVERY if drives else IDLE
 
     def asked_terminal(self, times: int = 1) -> None:
         """Count identity queries that were sent."""
@@ -116,7 +130,9 @@ class Heartbeat:
             self._asked.clear()
 
     def note_input(self, now: float) -> int:
-        """Note that there was input. Returns the number of identity queries to send now, if the terminal is lost."""
+        """Note that there was input. Returns the number of identity queries to send now, if the
+        terminal is lost.
+        """
         if not self.lost or (self._probed is not None and now - self._probed <= LIMIT):
             return 0
         if self._probed is not None:
@@ -138,11 +154,12 @@ class Heartbeat:
             self._lose(now)
 
     def _lose(self, now: float) -> None:
-        self.lost, self._lost_at, self._last = True, now, -math.inf
+        self.lost, self._lost_at, self._last = True, now, None
         self._probed, self._rounds = None, 0
 
 
-GREETING = 0.2  # s for the terminal to report whether it has releases; keys typed before may have been held earlier
+# s for the terminal to report whether it has releases; keys typed before may have been held earlier
+GREETING = 0.2
 PLAIN_FOR = 2.0  # s of plain keys for Docker
 UNANSWERED = "the terminal does not answer: stopped"
 ANSWERS = "the terminal answers again: press a key to drive"
@@ -155,24 +172,29 @@ class TerminalLiveness:
     def __init__(self, terminal: Terminal, keyboard: Keyboard) -> None:
         self._terminal, self._keyboard, self._heartbeat = terminal, keyboard, Heartbeat()
         self.is_attached, self._multiplexer = attached(), multiplexer()
-        self._pressed_at = -math.inf
+        self._pressed_at: float | None = None
         self._heartbeat.asked_terminal()  # by `Terminal.enter`
-        self._speaks_kitty = False  # whether it has replied in the Kitty protocol since the last identity query
+        # whether it has replied in the Kitty protocol since the last identity query
+        self._speaks_kitty = False
         self._known = False  # whether it is known if it reports releases
         self._greeted = time.monotonic()
-        self._plain_until = math.inf
+        self._plain_until: float | None = None
 
     def begin(self) -> None:
         """Begin: its replies are read from now on."""
         self._greeted = time.monotonic()
 
     def is_new(self, now: float) -> bool:
-        """Whether the terminal has yet to report its features; a key that repeats now may have been held before."""
+        """Whether the terminal has yet to report its features; a key that repeats now may have been
+        held before.
+        """
         return not self._known and now - self._greeted < GREETING
 
     @property
     def lost(self) -> bool:
-        """Whether the terminal is lost, or has yet to reply since it came back. No key counts meanwhile."""
+        """Whether the terminal is lost, or has yet to reply since it came back. No key counts
+        meanwhile.
+        """
         return self._heartbeat.lost
 
     def note_input(self, now: float) -> None:
@@ -188,11 +210,13 @@ class TerminalLiveness:
             first = not self._terminal.releases
             self._terminal.report_releases(answer.flags)
             if first:
-                self._terminal.ask(ASK_KEYBOARD)  # once it has replied to this, all its keys report releases
+                # once it has replied to this, all its keys report releases
+                self._terminal.ask(ASK_KEYBOARD)
             self._known = not first
             self._keyboard.releases = self._speaks_kitty = True
         elif answer.to == "terminal":
-            # Replies arrive in the order of the queries: one with releases has already replied to the other query.
+            # Replies arrive in the order of the queries: one with releases has already replied to
+            # the other query.
             if not self._speaks_kitty:
                 self._terminal.send_plain_keys()
                 self._known, self._keyboard.releases = True, False
@@ -204,30 +228,35 @@ class TerminalLiveness:
 
     @property
     def blind_in(self) -> str:
-        """What hides a lost operator, so that a key without repeats counts for LASTS alone: tmux, screen, or a terminal
-        that has never replied; else "".
+        """What hides a lost operator, so that a key without repeats counts for LASTS alone: tmux,
+        screen, or a terminal that has never replied; else "".
         """
         return self._multiplexer or ("" if self._heartbeat.answers else MUTE)
 
     def lapse(self, now: float) -> str:
         """Why a key without repeats no longer counts; "" while it does."""
-        if not self.blind_in or now - self._pressed_at <= LASTS:
+        is_fresh = self._pressed_at is not None and now - self._pressed_at <= LASTS
+        if not self.blind_in or is_fresh:
             return ""
         return f"in {self.blind_in} a key counts for {LASTS:g} s: press it again"
 
     def check(self, now: float, engaged: bool, lasting: bool) -> str:
-        """Send due queries. Returns why the robot must stop, or "". `lasting`: keys drive without repeats."""
+        """Send due queries. Returns why the robot must stop, or "". `lasting`: keys drive without
+        repeats.
+        """
         if self._heartbeat.due(now, engaged and (lasting or self._terminal.releases)):
             self._ask()
-        if now > self._plain_until:
-            self._plain_until = math.inf
+        if self._plain_until is not None and now > self._plain_until:
+            self._plain_until = None
             self._ask_terminal()
         if self._heartbeat.has_missed(now):
             return UNANSWERED
         return DETACHED if engaged and not self.is_attached() else ""
 
     def send_plain_keys_for_docker(self, now: float) -> None:
-        """Let the terminal send plain keys for a while, since Docker knows its detach keys only in that form."""
+        """Let the terminal send plain keys for a while, since Docker knows its detach keys only in
+        that form.
+        """
         self._terminal.send_plain_keys()
         self._keyboard.releases, self._plain_until = False, now + PLAIN_FOR
 

@@ -21,7 +21,9 @@ def generate_launch_description():
     return LaunchDescription(
         [
             DeclareLaunchArgument("robot", default_value=ROBOT, description="a xacro file"),
-            DeclareLaunchArgument("kp_linear", default_value="1.5", description="speed in m/s for each metre to go"),
+            DeclareLaunchArgument(
+                "kp_linear", default_value="1.5", description="speed in m/s for each metre to go"
+            ),
             IncludeLaunchDescription(PythonLaunchDescriptionSource(gazebo)),
             Node(
                 package="robot_state_publisher",

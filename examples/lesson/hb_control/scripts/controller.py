@@ -59,7 +59,9 @@ def main(args=None):
             except Exception as error:
                 node.get_logger().error(f"service call failed: {error!r}")
                 break
-            node.get_logger().info(f"goal {node.index}: {goal.x_goal:.2f} {goal.y_goal:.2f} {goal.theta_goal:.2f}")
+            node.get_logger().info(
+                f"goal {node.index}: {goal.x_goal:.2f} {goal.y_goal:.2f} {goal.theta_goal:.2f}"
+            )
         rclpy.spin_once(node)
         if goal is not None and node.pose is not None and node.drive_to(goal):
             node.index = 0 if goal.end_of_list == 1 else node.index + 1

@@ -9,7 +9,14 @@ import tty
 import geometry_msgs.msg
 import rclpy
 
-MOVES = {"i": (1, 0, 0), ",": (-1, 0, 0), "J": (0, 1, 0), "L": (0, -1, 0), "j": (0, 0, 1), "l": (0, 0, -1)}
+MOVES = {
+    "i": (1, 0, 0),
+    ",": (-1, 0, 0),
+    "J": (0, 1, 0),
+    "L": (0, -1, 0),
+    "j": (0, 0, 1),
+    "l": (0, 0, -1),
+}
 
 
 def get_key(settings):

@@ -1,0 +1,1 @@
+"""The verbs record, replay and bag."""

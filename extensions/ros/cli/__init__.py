@@ -1,0 +1,1 @@
+"""The verbs run, launch and ros2."""

@@ -1,0 +1,1 @@
+"""The secure set-up: certificates of members, their roles, and the proof of their commands."""

@@ -1,0 +1,367 @@
+"""`holozen stop` and `holozen release` reach every robot there is, and report only what was
+confirmed.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from holozen import cli
+from holozen.bus import Bus
+from holozen.cli import stop as stop_module
+from holozen.messages import CommandStatus, TriggerReply, TriggerRequest
+from holozen.testing import Process, Wire, wait_for
+from holozen.testing.wire import command
+from holozen.transport.connection import GROUP
+from holozen.transport.errors import ServiceError
+from holozen.transport.services import Server
+from holozen.wire import key_for
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+class Robots:
+    """Robots that only remember that they were called; `refusals` are their replies before they
+    obey.
+    """
+
+    def __init__(self, wire: Wire) -> None:
+        self.wire, self.refusals, self.message = wire, list[str](), "whatever"
+        self.called = set[tuple[str, str]]()  # keys, and the sims whose they are
+        self.first_called = threading.Event()
+        self._servers = list[Server]()
+
+    def add(
+        self, *keys: str, wire: str = "json", hangs: bool = False, bus: Bus | None = None
+    ) -> Bus:
+        """A sim of its own, or that of a `bus`, that serves these keys, or holds them and does not
+        answer.
+        """
+        bus = bus or self.wire.bus("sim", wire=wire)
+        for key in keys:
+            server = bus.serve(key, TriggerRequest, TriggerReply, self._answer(key, bus.id))
+            self._servers.append(server)
+            if not hangs:
+                server.start()
+        return bus
+
+    def _answer(self, key: str, sim: str) -> Callable[[TriggerRequest], TriggerReply]:
+        def answer(_request: TriggerRequest) -> TriggerReply:
+            if self.refusals:
+                raise ServiceError(self.refusals.pop())
+            self.called.add((key, sim))
+            self.first_called.set()
+            return TriggerReply(True, self.message)
+
+        return answer
+
+    def drop_tokens(self) -> None:
+        """Go on serving, but announce nothing."""
+        for server in self._servers:
+            server.ends.pop().undeclare()
+
+    def keys(self) -> set[str]:
+        return {key for key, _ in self.called}
+
+
+@contextmanager
+def repeated(bus: Bus, status: CommandStatus, after: float = 0.0) -> Iterator[None]:
+    """The status of the robot at the root, published all the time `after` so many seconds."""
+    publisher, end = bus.publisher("cmd_vel_status", CommandStatus), threading.Event()
+
+    def publish() -> None:
+        end.wait(after)
+        while not end.wait(0.02):
+            publisher.put(status)
+
+    thread = threading.Thread(target=publish)
+    thread.start()
+    try:
+        yield
+    finally:
+        end.set()
+        thread.join()
+
+
+@pytest.fixture
+def robots(wire: Wire) -> Robots:
+    return Robots(wire)
+
+
+def test_without_a_name_all_robots_are_stopped_whatever_their_sims_speak(
+    robots: Robots, run: Run
+) -> None:
+    robots.add("stop", "Fred/stop", "Fred/release", "Fred/resume", "next_goal")
+    robots.add("Ann/stop")
+    robots.add("lab/Bob/stop", wire="cdr")
+    code, out, err = run("stop")
+    assert (code, err) == (0, "")
+    names = ("Ann", "Fred", "lab/Bob", "the robot at the root")
+    assert sorted(out.splitlines()) == [f"{name} is stopped" for name in names]
+    assert robots.keys() == {"Ann/stop", "Fred/stop", "lab/Bob/stop", "stop"}
+
+
+def test_those_that_are_named_are_stopped_and_no_other(robots: Robots, run: Run) -> None:
+    robots.add("stop", "Fred/stop", "Ann/stop", "Bob/stop")
+    assert run("stop", "Fred", "/Ann")[0] == 0
+    assert robots.keys() == {"Ann/stop", "Fred/stop"}
+
+
+def test_all_are_stopped_although_the_reader_has_gone(robots: Robots) -> None:
+    robots.add("Ann/stop", "Bob/stop")
+    robots.refusals.append("not yet")  # so that the other one is confirmed, and printed, before it
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run(
+        command("stop", *robots.wire.flags), stdout=writer, stderr=subprocess.PIPE, timeout=60
+    )
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert robots.keys() == {"Ann/stop", "Bob/stop"}
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"), [("Fred", {"Fred/stop"}), ("", {"Ann/stop", "Fred/stop"})]
+)
+def test_one_that_is_met_later_than_others_is_stopped_too(
+    robots: Robots, run: Run, name: str, expected: set[str]
+) -> None:
+    robots.add("Ann/stop")
+    bus = robots.wire.bus("late")  # a busy machine takes long to open one
+    late = threading.Timer(0.6, robots.add, ["Fred/stop"], {"bus": bus})
+    late.start()
+    try:
+        assert run("stop", *[name] * bool(name))[0] == 0
+        assert robots.keys() == expected
+    finally:
+        late.join()
+
+
+@pytest.mark.parametrize(
+    ("names", "place"), [(["Fred"], "Fred"), ([], "")], ids=["named", "at the root"]
+)
+def test_a_robot_whose_token_is_lost_among_forged_ones_is_stopped(
+    robots: Robots, run: Run, names: list[str], place: str
+) -> None:
+    key = key_for("stop", place)
+    robots.add(key)
+    robots.drop_tokens()
+    foreign = robots.wire.bus("foreign")
+    _forged = [
+        foreign.announce("srv", TriggerReply.ROS, f"forged{number}/stop") for number in range(100)
+    ]
+    assert (
+        f"{place or 'the robot at the root'} is stopped"
+        in run("stop", *names, "--timeout", "2")[1].splitlines()
+    )
+    assert robots.keys() == {key}
+
+
+def test_it_looks_for_robots_until_its_timeout(
+    robots: Robots, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Among thousands of tokens, those of robots come late."""
+    monkeypatch.setattr(stop_module, "NOTICE", 0.1)
+    robots.add("next_goal")
+    late = threading.Timer(1.5, robots.add, ["Fred/stop"])
+    late.start()
+    assert run("stop", "--timeout", "20")[:2] == (0, "Fred is stopped\n")
+    late.join()
+
+
+def test_release_reports_the_sims_reply(robots: Robots, run: Run) -> None:
+    robots.add("Fred/stop", "Fred/release")
+    assert run("release") == (0, "Fred is released: whatever\n", "")
+    robots.message = "the robot was not stopped"
+    assert run("release") == (0, "Fred was not stopped\n", "")
+    assert robots.keys() == {"Fred/release"}
+
+
+def test_as_json_it_is_one_object_a_robot(robots: Robots, run: Run) -> None:
+    robots.add("stop", "Fred/stop")
+    code, out, err = run("stop", "--json")
+    rows = sorted((json.loads(line) for line in out.splitlines()), key=lambda row: row["robot"])
+    reported = [
+        {"robot": name, "verb": "stop", "confirmed": True, "message": "whatever"}
+        for name in ("", "Fred")
+    ]
+    assert (code, rows, err) == (0, reported, "")
+
+
+def test_the_robot_at_the_root_goes_by_its_name(robots: Robots, run: Run) -> None:
+    with repeated(robots.add("stop", "Fred/stop"), CommandStatus(name="hb_bot")):
+        for name, key in (("hb_bot", "stop"), ("Fred", "Fred/stop")):
+            robots.called.clear()
+            assert run("stop", name) == (0, f"{name} is stopped\n", "")
+            assert robots.keys() == {key}
+        assert sorted(run("stop")[1].splitlines()) == ["Fred is stopped", "hb_bot is stopped"]
+        assert {json.loads(line)["robot"] for line in run("stop", "--json")[1].splitlines()} == {
+            "Fred",
+            "hb_bot",
+        }
+        assert (
+            run("stop", "bot")[2]
+            == "holozen stop: there is no robot 'bot'; there are: hb_bot, Fred\n"
+        )
+        robots.add("hb_bot/stop")
+        robots.called.clear()
+        assert run("stop", "hb_bot") == (0, "hb_bot is stopped\n" * 2, "")
+        assert robots.keys() == {"stop", "hb_bot/stop"}, "both have the name"
+
+
+def test_the_robot_at_the_root_is_waited_for_where_its_name_comes_late(
+    robots: Robots, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stop_module, "QUIET", 0.0)
+    with repeated(robots.add("stop", "lab/Fred/stop"), CommandStatus(name="hb_bot"), after=1.0):
+        assert run("stop", "hb_bot") == (0, "hb_bot is stopped\n", "")
+    assert robots.keys() == {"stop"}
+
+
+def test_one_that_does_not_answer_holds_up_no_other_and_is_reported(
+    robots: Robots, run: Run
+) -> None:
+    robots.add("Ann/stop", hangs=True)
+    robots.add("Fred/stop")
+
+    def is_reported() -> bool:
+        """False where a busy machine met one of them too late."""
+        code, out, err = run("stop", "--timeout", "0.8")
+        assert code == 1 and "Ann" not in out
+        return (out, err) == (
+            "Fred is stopped\n",
+            "holozen stop: Ann did not confirm within 0.8 s; it may move\n",
+        )
+
+    def is_reported_as_json() -> bool:
+        code, out, _ = run("stop", "Ann", "--timeout", "0.8", "--json")
+        assert code == 1 and '"confirmed": true' not in out
+        return '"confirmed": false' in out
+
+    wait_for(is_reported)
+    wait_for(is_reported_as_json)
+
+
+def test_where_two_sims_serve_one_robot_both_have_to_confirm(robots: Robots, run: Run) -> None:
+    robots.add("Fred/stop")
+    robots.add("Fred/stop")
+    assert run("stop") == (0, "Fred is stopped\n", "")
+    assert len(robots.called) >= 2  # on a busy machine they are asked again
+    robots.add("Fred/stop", hangs=True)
+    # On a busy machine it may be met too late.
+    wait_for(lambda: run("stop", "--timeout", "0.8")[:2] == (1, ""), 30)
+
+
+@pytest.mark.parametrize("names", [(), ("Fred",)], ids=["all", "named"])
+def test_a_sim_that_is_met_after_another_confirmed_the_same_robot_is_asked_too(
+    robots: Robots, run: Run, names: tuple[str, ...]
+) -> None:
+    robots.add("Fred/stop")
+    bus = robots.wire.bus("late")  # a busy machine takes long to open one
+
+    def add() -> None:
+        robots.first_called.wait()
+        robots.add("Fred/stop", bus=bus)
+
+    late = threading.Thread(target=add)
+    late.start()
+    assert run("stop", *names) == (0, "Fred is stopped\n", "")
+    late.join()
+    assert len(robots.called) == 2
+
+
+def test_a_robot_that_refuses_is_asked_again(robots: Robots, run: Run) -> None:
+    robots.refusals += ["not now", "not yet"]
+    robots.add("Fred/stop")
+    assert run("stop") == (0, "Fred is stopped\n", "")
+    robots.refusals += ["never"] * 10_000
+
+    def is_reported() -> bool:
+        """False where a busy machine met it too late."""
+        code, out, err = run("stop", "--timeout", "0.3")
+        assert (code, out) == (1, "")
+        return err == "holozen stop: Fred did not confirm within 0.3 s (never); it may move\n"
+
+    wait_for(is_reported)
+
+
+@pytest.mark.parametrize("payload", [b"[]", b"{", b'{"success": 1, "message": ""}', b"\xff"])
+def test_a_reply_that_is_none_confirms_nothing(wire: Wire, run: Run, payload: bytes) -> None:
+    bus = wire.bus("sim")
+    token = bus.announce("srv", TriggerReply.ROS, "Fred/stop")
+    queries = bus.session.declare_queryable(
+        "Fred/stop", lambda query: query.reply("Fred/stop", payload, encoding="application/json")
+    )
+
+    def is_reported() -> bool:
+        """False where a busy machine met it too late."""
+        code, out, err = run("stop", "--timeout", "0.3")
+        assert (code, out, err.count("\n")) == (1, "", 1)
+        return err.startswith("holozen stop: Fred did not confirm within 0.3 s")
+
+    wait_for(is_reported)
+    token.undeclare()
+    queries.undeclare()
+
+
+def test_a_name_that_does_not_exist_names_those_that_do(
+    robots: Robots, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stop_module, "NOTICE", 0.5)
+    robots.add("Fred/stop", "stop")
+    for name in ("Frd", "*", "**", "a b", "?", "a//b"):
+        robots.called.clear()
+        expected = (
+            f"holozen stop: there is no robot {name!r}; there are: the robot at the root, Fred\n"
+        )
+        assert run("stop", name) == (1, "", expected)
+        assert robots.called == set()
+        assert run("stop", name, "/Fred/")[:2] == (1, "Fred is stopped\n")
+
+
+def test_without_a_robot_it_reports_that(robots: Robots, run: Run) -> None:
+    code, out, err = run("stop", "--timeout", "0.1")
+    assert (code, out) == (1, "")
+    assert err.startswith(f"holozen stop: no nodes found at {robots.wire.endpoint}; ")
+    robots.add("next_goal")
+    code, _, err = run("release", "--timeout", "2")
+    assert (code, err.count("\n")) == (1, 1)
+    assert err.startswith(
+        "holozen release: no robot was found (where an access control list is in force, "
+    )
+
+
+def test_without_a_router_it_reports_that(capsys: pytest.CaptureFixture[str]) -> None:
+    code = cli.main(
+        ["stop", "--mode", "client", "--connect", "tcp/127.0.0.1:1", "--timeout", "0.1"]
+    )
+    out, err = capsys.readouterr()
+    assert (code, out, err.count("\n")) == (1, "", 1)
+    assert err.startswith("holozen stop: no robot was reached: cannot open Zenoh: ")
+
+
+DEAF = """
+import socket, sys, time
+deaf = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+deaf.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+deaf.bind((sys.argv[1], int(sys.argv[2])))
+print("up", flush=True)
+time.sleep(3600)
+"""
+
+
+def test_a_process_that_is_there_and_does_not_answer_is_named(run: Run, wire: Wire) -> None:
+    with Process([sys.executable, "-c", DEAF, GROUP, str(wire.port)]) as deaf:
+        deaf.wait_for_line("up")
+        code, out, err = run("stop", "--timeout", "0.5")
+    assert (code, out, err.count("\n")) == (1, "", 1)
+    assert err.startswith("holozen stop: no robot was reached: ")
+    assert "does not answer" in err
+    assert f"(pid {deaf.pid}) in the group" in err
+    assert "it hangs, or others keep it busy" in err

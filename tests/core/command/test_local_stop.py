@@ -1,0 +1,110 @@
+"""A stop of this machine needs no network: only the socket of whoever serves the robot."""
+
+import os
+import socket
+import stat
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from holozen.command.local_stop import HANGS, TURNS, LocalStop, LocalStops, Served, stop_here
+
+Make = Callable[..., LocalStops]
+
+
+@pytest.fixture(params=["short", "long"])
+def make(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> Iterator[Make]:
+    """Makes servers below a folder of the test, in a path also longer than a socket's address may
+    be.
+    """
+    monkeypatch.setenv(
+        "HOLOZEN_STATE", str(tmp_path / ("x" * 100 if request.param == "long" else "x"))
+    )
+    made: list[LocalStops] = []
+
+    def make(*robots: str, network: str = "here", stands: bool = True, **more: Any) -> LocalStops:
+        served = [Served(robot, robot or "hb_bot") for robot in robots]
+        write = more.get("write", lambda robot, by: "")
+        made.append(
+            LocalStops("1a", [network, "too"], lambda: served, write, stands=stands, reporter="sim")
+        )
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close()
+
+
+def obey(server: LocalStops, orders: list[tuple[list[str], str]], end: threading.Event) -> None:
+    while not end.wait(0.001):
+        for order in server.take():
+            orders.append(([one.robot for one in order.robots], order.by))
+            order.message = "the disk is full"
+
+
+def test_each_process_stops_its_robots_in_this_network_and_says_what_came_of_it(make: Make) -> None:
+    servers = make("Fred", "Bob"), make(""), make("Fred", network="elsewhere")
+    end, orders = threading.Event(), [list[tuple[list[str], str]]() for _ in servers]
+    loops = [
+        threading.Thread(target=obey, args=(server, seen, end))
+        for server, seen in zip(servers, orders, strict=True)
+    ]
+    for loop in loops:
+        loop.start()
+    try:
+        assert sorted(stop_here(["here"], ["Fred"], "Ann")) == [
+            LocalStop("Fred", "Fred", "1a", True, "the disk is full")
+        ]
+        assert [one.robot for one in stop_here(["here"], ["hb_bot"], "Ann")] == [""]
+        assert sorted(one.robot for one in stop_here(["here", "far"], [], "Ann")) == [
+            "",
+            "Bob",
+            "Fred",
+        ]
+        assert stop_here(["far"], [], "Ann") == []
+    finally:
+        end.set()
+        for loop in loops:
+            loop.join()
+    assert orders == [
+        [(["Fred"], "Ann"), (["Fred", "Bob"], "Ann")],
+        [([""], "Ann"), ([""], "Ann")],
+        [],
+    ]
+
+
+def test_a_process_that_hangs_is_stopped_all_the_same_and_keeps_the_stop(make: Make) -> None:
+    written = list[tuple[str, str]]()
+    hung = make("Fred", write=lambda robot, by: written.append((robot, by)))
+    turning = make("Kiwi", stands=False)
+    assert sorted(stop_here(["here"], [], "Ann")) == [
+        LocalStop("Fred", "Fred", "1a", True, HANGS),
+        LocalStop("Kiwi", "Kiwi", "1a", False, TURNS),
+    ]
+    assert written == [("Fred", "Ann")]
+    # once they go on
+    assert [order.by for server in (hung, turning) for order in server.take()] == ["Ann", "Ann"]
+
+
+def test_nobody_else_can_reach_the_socket_and_none_is_left_behind(
+    make: Make, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = make("Fred")
+    (path,) = (folder := Path(os.environ["HOLOZEN_STATE"], "local")).iterdir()
+    assert [stat.S_IMODE(each.stat().st_mode) for each in (folder, path)] == [0o700, 0o600]
+    dead = folder / f"1-2-{path.stem.split('-')[2]}.stop"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as killed, monkeypatch.context() as there:
+        there.chdir(folder)
+        killed.bind(dead.name)  # and nobody removes it
+    stop_here(["here"], [], "Ann")
+    one.close()
+    assert [*folder.iterdir()] == []
+    folder.chmod(0o777)
+    make("Fred").close()
+    assert stop_here(["here"], [], "Ann") == []
+    assert capfd.readouterr().err.count("it is not a folder of yours with mode 0700") == 2

@@ -1,0 +1,89 @@
+"""What scripts/venv uses and says on machines with other Pythons: programs that only say what they
+were asked.
+"""
+
+import os
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+REPO = Path(__file__).parents[2]
+COMMANDS = ("bash", "cat", "cksum", "dirname", "env", "sed")  # all else that the script calls
+PYTHON = """#!/bin/sh
+case "$*" in
+  *"(3, 11) <="*) test {minor} -ge 11 -a {minor} -le 14; exit ;;
+  *ensurepip*) {venv}; exit ;;
+  *-venv*) echo python3.{minor}-venv; exit ;;
+  --version) echo "Python 3.{minor}.1"; exit ;;
+esac
+echo "made by 3.{minor}: $*" >&2; exit 1
+"""
+UV = '#!/bin/sh\necho "made by uv: $*" >&2; exit 1\n'
+SetUp = Callable[..., str]
+
+
+@pytest.fixture
+def set_up(tmp_path: Path) -> SetUp:
+    """`set_up(system, {name: minor version}, *programs)`: the last line of a set-up there, which
+    ends after the choice.
+
+    A Python with a version below zero has no ensurepip.
+    """
+
+    def run(system: str, pythons: dict[str, int], uv: bool = False) -> str:
+        tree, path = tmp_path / "tree", tmp_path / "bin"
+        for folder in (tree / "scripts", path):
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir(parents=True)
+        for name in ("scripts/venv", "pyproject.toml", "requirements.lock"):
+            shutil.copy(REPO / name, tree / name)
+        for command in COMMANDS:
+            found = shutil.which(command)
+            assert found
+            (path / command).symlink_to(found)
+        programs = {"uname": f"#!/bin/sh\necho {system}\n"} | ({"uv": UV} if uv else {})
+        for name, minor in pythons.items():
+            programs[name] = PYTHON.format(minor=abs(minor), venv="true" if minor > 0 else "false")
+        for name, text in programs.items():
+            (path / name).write_text(text)
+            (path / name).chmod(0o755)
+        env = {"PATH": str(path), "TMPDIR": os.environ.get("TMPDIR", "/tmp")}
+        done = subprocess.run(
+            [path / "bash", tree / "scripts" / "venv"], env=env, capture_output=True, text=True
+        )
+        assert done.returncode == 1, done.stderr
+        return done.stderr.splitlines()[-1]
+
+    return run
+
+
+PC, PI, MAC = "Linux x86_64", "Linux aarch64", "Darwin arm64"
+ALL = {"python3": 12, "python3.11": 11, "python3.12": 12, "python3.13": 13, "python3.14": 14}
+
+
+def test_it_takes_3_11_where_pybullet_has_a_wheel_and_the_newest_elsewhere(set_up: SetUp) -> None:
+    assert set_up(PC, ALL).startswith("made by 3.11: -m venv")
+    assert set_up(PI, ALL).startswith("made by 3.14: -m venv")
+    assert set_up(MAC, {"python3": 12}).startswith("made by 3.12: -m venv")
+    assert set_up(PC, {"python3": 10, "python3.13": 13}).startswith("made by 3.13: -m venv")
+
+
+def test_with_uv_it_uses_that_and_lets_it_get_a_python_if_there_is_none(set_up: SetUp) -> None:
+    assert "--python python3.13 .venv" in set_up(PC, {"python3.13": -13}, uv=True)
+    assert "--python 3.11 .venv" in set_up(PC, {"python3": 10}, uv=True)
+    assert "--python 3.14 .venv" in set_up(MAC, {}, uv=True)
+
+
+def test_otherwise_one_line_says_what_to_install(set_up: SetUp) -> None:
+    needs = "holozen: it needs Python 3.11, 3.12, 3.13 or 3.14, and there is {}; "
+    needs += "install one of those, or uv, which gets one"
+    assert set_up(PC, {"python3": 10}) == needs.format("Python 3.10.1")
+    assert set_up(PI, {}) == needs.format("no Python")
+    venv = (
+        "holozen: python3.13 cannot make a .venv; on Debian and Ubuntu: sudo apt install "
+        "python3.13-venv"
+    )
+    assert set_up(PI, {"python3": -13, "python3.13": -13}) == venv

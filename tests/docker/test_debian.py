@@ -1,0 +1,79 @@
+"""A fresh clone in a container of Debian 13 with Python 3.13, set up by pip: what README's first
+command does.
+"""
+
+import io
+import os
+import subprocess
+import tarfile
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from tests.elsewhere import chosen, clone
+
+from .stack import ROOT, docker
+
+BASE = ROOT.parent / "shared" / "base-image"
+NAME = "python:3.13-slim-trixie"
+TREE = "/srv/holozen"
+LONG = os.environ.get("HOLOZEN_LONG") == "1"
+Run = Callable[..., str]
+
+pytestmark = [
+    pytest.mark.skipif(
+        not LONG, reason="not built: scripts/test --long makes and tries a Debian with Python 3.13"
+    ),
+    pytest.mark.timeout(3600),
+]
+
+
+@pytest.fixture(scope="module")
+def run(engine: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
+    """`run(WORDS...)`: their output, in a container with a fresh clone; they have to succeed."""
+    if BASE.exists():
+        subprocess.run([BASE, "3.13"], check=True, capture_output=True)
+    container = docker("run", "--detach", "--rm", "--init", NAME, "sleep", "infinity").strip()
+    archive = io.BytesIO()
+    with tarfile.open(fileobj=archive, mode="w") as tar:
+        tar.add(clone(tmp_path_factory.mktemp("clone")), arcname=TREE)
+    subprocess.run(["docker", "cp", "-", f"{container}:/"], input=archive.getvalue(), check=True)
+
+    def run(*words: str) -> str:
+        words = ("docker", "exec", "--workdir", TREE, container, *words)
+        done = subprocess.run(words, capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    yield run
+    docker("rm", "--force", container)
+
+
+def test_the_first_minutes_in_debian_13(run: Run) -> None:
+    up = (
+        "scripts/up >/tmp/up 2>&1 & for _ in $(seq 3000); do grep -q 'listens on' /tmp/up && "
+        "break; sleep 0.2; done"
+    )
+    shown = run(
+        "bash", "-c", f"{up}; .venv/bin/holozen topic echo odom --once; kill %1; wait; cat /tmp/up"
+    )
+    assert (
+        "sim: the engine is mujoco, since pybullet has no wheel for Python 3.13 on Linux" in shown
+    )
+    assert (
+        "child_frame_id: " in shown
+        and "controller: continues" in shown
+        and "Traceback" not in shown
+    )
+    run("scripts/venv", "requirements-dev.lock")
+    run(".venv/bin/python", "-m", "pytest", "-q", "-p", "no:cacheprovider", *chosen())
+
+
+def test_the_tests_of_single_parts_pass_in_debian_13(run: Run) -> None:
+    """tests/integration takes a quarter of an hour more, and wants programs that a container
+    lacks.
+    """
+    run("scripts/venv", "requirements-dev.lock")
+    parts = str(next(ROOT.glob("tests/*/test_engines.py")).parent.relative_to(ROOT))
+    words = ("-q", "-p", "no:cacheprovider", "-n", "2", "--dist=loadfile", "-m", "not alone")
+    run(".venv/bin/python", "-m", "pytest", *words, parts)
