@@ -4,7 +4,8 @@ in it.
 ROOT/ca.pem, ROOT/ca.key     the authority; `ca.key` stays where members are added ROOT/members.json
 the members, and the names that were revoked ROOT/NAME/                   what that member needs, to
 be copied to its machine: ca.pem, cert.pem, key.pem;
-                             the router's, the sim's and an autopilot's have members.json too
+                             the router's, the sim's and an autopilot's have members.json too,
+                             an operator's page.pem and page.key, if it serves a page
 """
 
 import datetime
@@ -18,6 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from cryptography import x509
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
 from cryptography.hazmat.primitives.serialization import (
     Encoding,
@@ -29,7 +32,15 @@ from cryptography.hazmat.primitives.serialization import (
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from holozen.console import Failure
-from holozen.secure.members import AUTHORITY, CERTIFICATE, KEY, MEMBERS, check_unchanged
+from holozen.secure.members import (
+    AUTHORITY,
+    CERTIFICATE,
+    KEY,
+    MEMBERS,
+    PAGE_CERTIFICATE,
+    PAGE_KEY,
+    check_unchanged,
+)
 from holozen.secure.roles import ROLES, ROUTER
 from holozen.transport.errors import BusError
 
@@ -123,6 +134,29 @@ def revoke(root: Path, name: str) -> None:
     shutil.rmtree(root / name, ignore_errors=True)
 
 
+def certify_page(root: Path, name: str, hosts: Sequence[str], days: float) -> str:
+    """Make a certificate for the page that a member serves at `hosts` and at loopback, and return
+    its SHA-256 fingerprint as browsers show it.
+
+    The authority does not sign it: browsers accept no Ed25519, the kind of its key.
+    """
+    _member(members(root), name)
+    key = ec.generate_private_key(ec.SECP256R1())
+    subject = _name(hosts[0] if hosts else HERE[0])
+    names = x509.SubjectAlternativeName([_host(host) for host in (*hosts, *HERE)])
+    builder = _builder(subject, key.public_key(), days).issuer_name(subject)
+    builder = builder.add_extension(names, critical=False)
+    builder = builder.add_extension(
+        x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH]), critical=True
+    )
+    certificate = builder.sign(key, hashes.SHA256())
+    folder = root / name
+    folder.mkdir(mode=0o700, exist_ok=True)
+    _write_key(folder / PAGE_KEY, key)
+    _write(folder / PAGE_CERTIFICATE, certificate.public_bytes(Encoding.PEM))
+    return certificate.fingerprint(hashes.SHA256()).hex(":").upper()
+
+
 def members(root: Path) -> dict[str, Any]:
     """The table of an authority: "members", name -> role, key, expires; and "revoked", the
     names.
@@ -176,7 +210,9 @@ def _issue(
     )
 
 
-def _builder(subject: x509.Name, key: Ed25519PublicKey, days: float) -> x509.CertificateBuilder:
+def _builder(
+    subject: x509.Name, key: Ed25519PublicKey | ec.EllipticCurvePublicKey, days: float
+) -> x509.CertificateBuilder:
     now = datetime.datetime.now(datetime.UTC).replace(microsecond=0)
     begin = now - datetime.timedelta(hours=1)  # for clocks that are slow
     builder = (
@@ -207,7 +243,7 @@ def _write_members(root: Path, table: dict[str, Any]) -> None:
         _write(folder / MEMBERS, data)
 
 
-def _write_key(path: Path, key: Ed25519PrivateKey) -> None:
+def _write_key(path: Path, key: Ed25519PrivateKey | ec.EllipticCurvePrivateKey) -> None:
     _write(path, key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()))
 
 

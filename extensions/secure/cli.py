@@ -13,6 +13,10 @@ from holozen.secure.roles import ROLES, ROUTER
 from holozen.transport.connection import secure_folder
 
 DAYS = 365
+HOST = {
+    "init": "where others reach the router, besides loopback",
+    "page": "where others open the page, besides loopback",
+}
 Act = Callable[[Any, Path, argparse.Namespace], str]
 """The work of a verb: called with the module holozen.secure.authority and the folder; returns the
 text to print.
@@ -39,6 +43,14 @@ def _renew(authority: Any, root: Path, args: argparse.Namespace) -> str:
         "members.json to router and sim"
     )
     return f"{root}: new certificates; {elsewhere}"
+
+
+def _page(authority: Any, root: Path, args: argparse.Namespace) -> str:
+    fingerprint = authority.certify_page(root, args.name, args.host, args.days)
+    return (
+        f"{root / args.name}: `holozen view --secure` serves https with page.pem\nSHA-256 fingerprint, "
+        f"which a browser shows before you trust it: {fingerprint}"
+    )
 
 
 def _revoke(authority: Any, root: Path, args: argparse.Namespace) -> str:
@@ -90,20 +102,17 @@ def _arguments(verb: str) -> Callable[[argparse.ArgumentParser], None]:
             help="the folder of the authority (default: HOLOZEN_SECURE, or "
             "~/.config/holozen/secure)",
         )
-        if verb == "init":
-            add(
-                "--host",
-                action="append",
-                default=[],
-                help="where others reach the router, besides loopback",
-            )
+        if verb in HOST:
+            add("--host", action="append", default=[], help=HOST[verb])
         if verb == "add":
             add("role", choices=ROLES)
         if verb in ("add", "revoke"):
             add("name")
+        if verb == "page":
+            add("name", nargs="?", default="operator", help="the member (default: %(default)s)")
         if verb == "renew":
             add("names", nargs="*", metavar="NAME", help="a member (default: all)")
-        if verb in ("init", "add", "renew"):
+        if verb in ("init", "add", "renew", "page"):
             add(
                 "--days",
                 type=count(1, 3650),
@@ -127,6 +136,12 @@ VERBS = by_name(
             ),
             ("add", "add a member", "operator Ann", _add),
             ("renew", "issue new certificates to members, for the keys they have", "Ann", _renew),
+            (
+                "page",
+                "make the certificate with which a member's view serves https",
+                "--host robot.local",
+                _page,
+            ),
             ("revoke", "remove a member; the router starts anew without it", "Ann", _revoke),
             ("show", "list the members, their roles and when their certificates expire", "", _show),
         )

@@ -28,6 +28,7 @@ from holozen.transport.errors import BusError
 from holozen.transport.samples import PRIORITIES, Sample
 
 AUTHORITY, CERTIFICATE, KEY, MEMBERS = "ca.pem", "cert.pem", "key.pem", "members.json"
+PAGE_CERTIFICATE, PAGE_KEY = "page.pem", "page.key"  # for browsers
 LOOK = 0.5  # s between two checks for a new list
 SIGNATURE = 128  # hexadecimal digits
 RENEWAL = 30 * 86_400  # s before its end from which a certificate should be renewed

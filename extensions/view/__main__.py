@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import os
 import re
 import secrets
 import socket
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 PORT, FOXGLOVE_PORT = 8080, 8765
 NO_TOKEN = "none"
 ALL = ("0.0.0.0", "::")  # addresses that listen on every interface
+OF_MEMBER = ("page.pem", "page.key")  # in its folder, by `holozen secure page`
 
 
 def parser() -> argparse.ArgumentParser:
@@ -66,7 +68,12 @@ def parser() -> argparse.ArgumentParser:
         "a --host beyond this "
         "machine, else none); none: no token, where all who reach the port may drive",
     )
-    add("--cert", metavar="FILE", help="serve https with this certificate (PEM); with --key")
+    add(
+        "--cert",
+        metavar="FILE",
+        help="serve https with this certificate (PEM); with --key (default with --secure: that of "
+        "`holozen secure page`, if it was made)",
+    )
     add("--key", metavar="FILE", help="the private key of --cert")
     add("--look-only", action="store_true", help="a page that drives, adds and deletes nothing")
     connection.add_arguments(parser, role="operator")
@@ -105,7 +112,7 @@ def _run(args: argparse.Namespace) -> int:
     if args.foxglove:
         return _serve_foxglove(args, where, token)
     stop = stop_event()
-    tls = _tls(args.cert, args.key)
+    tls = _tls(*_certificate(args, where.secure))
     _check_port(args.host, args.port)
     from holozen.robot.files import description, loading, reader
 
@@ -152,6 +159,16 @@ def _serve_foxglove(args: argparse.Namespace, where: connection.Connection, toke
             report(f"view: {line}")
         server.run(stop)
     return 0
+
+
+def _certificate(args: argparse.Namespace, member: str) -> tuple[str | None, str | None]:
+    """The files of the page's certificate and its key: those given, else those in the folder of the
+    `member` whose page it is.
+    """
+    own = tuple(os.path.join(member, name) for name in OF_MEMBER)
+    if args.cert or args.key or not member or not os.path.exists(own[0]):
+        return args.cert, args.key
+    return own[0], own[1]
 
 
 def _tls(cert: str | None, key: str | None) -> "ssl.SSLContext | None":

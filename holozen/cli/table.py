@@ -85,7 +85,7 @@ VERBS = {
     "router": Row("run a Zenoh router", "holozen.cli.router", ROUTER),
     "ros2": Row("join ROS 2 nodes, by rmw_zenoh or a bridge to DDS", "holozen.ros.cli.ros2"),
     "secure": Row(
-        "init, add, renew, revoke, show", "holozen.secure.cli", is_noun=True, extra="secure"
+        "init, add, renew, revoke, page, show", "holozen.secure.cli", is_noun=True, extra="secure"
     ),
     "run": Row(
         "run a Python script that was written for ROS 2", "holozen.ros.cli.run", extra="run"

@@ -120,6 +120,7 @@ VERBS = {
     "secure add": row(None, ("viewer Bob --secure {tmp}/none", *NO_FILE), bus=False),
     "secure renew": row(None, ("--secure {tmp}/none", *NO_FILE), bus=False),
     "secure revoke": row(None, ("Bob --secure {tmp}/none", *NO_FILE), bus=False),
+    "secure page": row(None, ("--secure {tmp}/none", *NO_FILE), bus=False),
     "secure show": row(None, ("--secure {tmp}/none", *NO_FILE), bus=False),
     # what else it does is in tests/extensions/ros
     "run": row(None, ("{tmp}/none.py", 1, "none.py does not exist")),

@@ -5,6 +5,9 @@ senders.
 import contextlib
 import os
 import socket
+import ssl
+import urllib.error
+import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,7 +15,9 @@ from typing import Any, NamedTuple
 import pytest
 import zenoh
 from cryptography import x509
+from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePublicKey
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+from cryptography.hazmat.primitives.hashes import SHA256
 
 from holozen import cli, entities
 from holozen.bags.formats import format_of
@@ -681,6 +686,22 @@ def test_two_commands_make_a_network_for_members_alone(tmp_path: Path) -> None:
     ):
         pass
     assert "Traceback" not in up.err and "was killed" not in up.err, up.err
+
+
+def test_an_operators_page_is_encrypted_by_a_certificate_that_a_browser_can_trust(
+    fleet: Fleet,
+) -> None:
+    fingerprint = authority.certify_page(fleet.root, "Ann", ["robot.local"], 1)
+    trusted = ssl.create_default_context(cafile=str(fleet.root / "Ann" / "page.pem"))
+    certificate = x509.load_pem_x509_certificate((fleet.root / "Ann" / "page.pem").read_bytes())
+    assert fingerprint.replace(":", "").lower() == certificate.fingerprint(SHA256()).hex()
+    assert isinstance(certificate.public_key(), EllipticCurvePublicKey)  # browsers know no Ed25519
+    view = fleet.start("view", "--port", "0", "--connect", fleet.endpoint, folder="Ann")
+    address = view.wait_for_line("https://", 60).split()[-1]
+    with urllib.request.urlopen(address, context=trusted) as page:
+        assert b"STOP" in page.read()
+    with pytest.raises(urllib.error.URLError, match="CERTIFICATE_VERIFY_FAILED"):
+        urllib.request.urlopen(address)
 
 
 def test_the_verb_makes_shows_renews_and_revokes(
