@@ -48,8 +48,8 @@ def _renew(authority: Any, root: Path, args: argparse.Namespace) -> str:
 def _page(authority: Any, root: Path, args: argparse.Namespace) -> str:
     fingerprint = authority.certify_page(root, args.name, args.host, args.days)
     return (
-        f"{root / args.name}: `holozen view --secure` serves https with page.pem\nSHA-256 fingerprint, "
-        f"which a browser shows before you trust it: {fingerprint}"
+        f"{root / args.name}: `holozen view --secure` serves https with page.pem\n"
+        f"SHA-256 fingerprint, which a browser shows before you trust it: {fingerprint}"
     )
 
 
