@@ -51,6 +51,7 @@ EDIT = re.compile(r"(?P<file>[^,]+)(?:, (?P<how>before|after|instead of) (?P<whe
 READ = {"py", "text", "toml", "xml"}  # blocks that are only read
 WITHIN = 60.0  # s for a command
 MOMENT = 5.0  # s for the first line of one that goes on; it may have nothing to say
+OF_A_SIM = "listens on"  # after lines that it prints before anyone can find it
 MORE = 0.5  # s that it has to go on after that, since the line may be an error
 
 
@@ -137,7 +138,7 @@ class Reader:
         """Run a command a line; those that go on are `started`, and have begun before one that ends
         is run.
         """
-        begun = list[tuple[Terminal, float]]()
+        begun = list[tuple[Terminal, str, float]]()
         for text in [*lines, ""]:
             line = text.partition("  #")[0].strip()
             if line.startswith("export "):
@@ -147,9 +148,12 @@ class Reader:
             goes_on = GOES_ON.match(line)
             if goes_on:
                 started.append(self.open(line.removesuffix(" &")))
-                begun.append((started[-1], time.monotonic() + MOMENT))
+                said = OF_A_SIM if "holozen sim" in line else ""
+                moment = WITHIN if said else MOMENT
+                begun.append((started[-1], said, time.monotonic() + moment))
             while begun and (" record " in line or not goes_on):
-                wait_for(partial(speaks, *begun.pop(0)))
+                terminal, said, until = begun.pop(0)
+                wait_for(partial(speaks, terminal, said, until), 2 * WITHIN)
             if " record " in line:
                 time.sleep(1.0)
                 end([started.pop()])
@@ -222,12 +226,13 @@ def end(terminals: list[Terminal]) -> None:
         terminal.close()
 
 
-def speaks(terminal: Terminal, until: float) -> bool:
-    """Whether a terminal shows anything, or has been waited for. AssertionError if its command
-    ended.
+def speaks(terminal: Terminal, said: str, until: float) -> bool:
+    """Whether a terminal shows what is to be `said`, or anything if that is empty, or has been
+    waited for. AssertionError if its command ended.
     """
     assert terminal.process.returncode is None, plain(terminal.raw)
-    return bool(plain(terminal.raw).strip()) or time.monotonic() > until
+    shown = plain(terminal.raw).strip()
+    return bool(shown and said in shown) or time.monotonic() > until
 
 
 def has(terminal: Terminal, shown: str) -> bool:
