@@ -93,9 +93,8 @@ def table() -> str:
 def page() -> str:
     """The rules as sections of Markdown, each with an example."""
     return "\n".join(
-        f"## {rule.name}\n\n{rule.severity.capitalize()}: {rule.finds}, since {rule.why}. "
-        "Wrong:\n\n"
-        f"```xml\n{wrong.rstrip()}\n```\n\nRight:\n\n```xml\n{right.rstrip()}\n```\n"
+        f"## {rule.name}\n\n{rule.severity.capitalize()}: {rule.finds}.\n\n"
+        f"```xml\n<!-- wrong -->\n{wrong.rstrip()}\n<!-- right -->\n{right.rstrip()}\n```\n"
         for rule in EVERY
         for wrong, right in [EXAMPLES[rule.name]]
     )
