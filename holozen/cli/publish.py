@@ -39,10 +39,10 @@ from holozen.transport.pubsub import Latest, RawPublisher, Subscription
 from holozen.transport.samples import Sample
 
 STOPS, STOP_EVERY = 5, 0.02  # s
-WAITING = "waiting for the robot: its beat is not heard yet"
+WAITING = "waiting for the robot: nothing was heard from it yet"
 NO_BEAT = (
-    "the robot is there, but does not beat: nothing was sent within {seconds:g} s; `holozen "
-    "doctor` looks why"
+    "nothing was sent: the robot is there, but nothing was heard from it within {seconds:g} s; "
+    "`holozen doctor` looks why"
 )
 NOTICE = 0.5  # s of waiting for a beat after which that is reported
 BEAT_PATIENCE = 5.0  # s to wait for a beat where no --max-wait is given
