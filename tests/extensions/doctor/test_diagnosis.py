@@ -97,14 +97,15 @@ def test_nodes_of_other_versions_and_nodes_that_do_not_answer_are_named() -> Non
     assert (same.level, same.text) == (OK, "1 of this version: sim (pid 7 on there)")
 
 
-def test_a_node_that_is_open_to_the_network_is_a_warning() -> None:
+def test_a_node_that_listens_beyond_loopback_is_a_warning() -> None:
     payload = json.dumps(ABOUT | {"exposed": ["tcp/0.0.0.0:7447"]}).encode()
     exposed = read_peer("@holozen/abc/about", payload, 100.0, 100.2)
     assert exposed is not None
     (finding,) = open_ports([exposed, peer()])
     assert (finding.level, finding.check) == (WARNING, "network")
     assert finding.text.startswith(
-        "sim (pid 7 on there) listens at tcp/0.0.0.0:7447, open to the network: anyone"
+        "sim (pid 7 on there) listens at tcp/0.0.0.0:7447, and asks for no password or certificate: "
+        "whoever can reach it can drive"
     )
 
 
