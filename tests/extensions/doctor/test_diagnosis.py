@@ -104,8 +104,8 @@ def test_a_node_that_listens_beyond_loopback_is_a_warning() -> None:
     (finding,) = open_ports([exposed, peer()])
     assert (finding.level, finding.check) == (WARNING, "network")
     assert finding.text.startswith(
-        "sim (pid 7 on there) listens at tcp/0.0.0.0:7447, and asks for no password or certificate: "
-        "whoever can reach it can drive"
+        "sim (pid 7 on there) listens at tcp/0.0.0.0:7447, and asks for no password or "
+        "certificate: whoever can reach it can drive"
     )
 
 
