@@ -561,19 +561,26 @@ def commands(key: str, status: "CommandStatus", writers: Iterable[str] = ()) -> 
     """The findings about the sources that command the robot at `key`; `writers` are the nodes that
     could.
     """
-    robot, name = status.name or "the robot", key.rpartition("/")[0]
+    robot, name, writers = status.name or "the robot", key.rpartition("/")[0], {*writers}
     if status.stopped:
         text = f"{robot} is stopped by {status.stopped}, and ignores all commands"
         yield Finding(key, WARNING, text, f"holozen release {name}".strip())
     driving = sorted((source for source in status.sources if source.rate >= DRIVES), key=_rank)
     resume = f"{resume_command(name)}, or r in the teleop"
-    if not driving and status.held:
+    waits = "controller" in writers or any(source.held for source in status.sources)
+    if not driving and status.held and waits:
         text = (
-            f"{robot} stands still: a person drove it, so the controller waits, and so do "
-            "scripts that it overruled"
+            f"{robot} stands still: a person drove or stopped it, so the controller, and scripts "
+            "that were overruled, wait"
         )
         yield Finding(key, WARNING, text, resume)
-    elif not driving and (silent := listed({*writers})) != "none":
+    elif not driving and status.held:
+        text = (
+            f"nothing commands {robot} since a person drove or stopped it; `holozen teleop` does, "
+            f"and a controller after {resume}"
+        )
+        yield Finding(key, OK, text)
+    elif not driving and (silent := listed(writers)) != "none":
         more = f"; if the controller is held: {resume}" if "controller" in writers else ""
         yield Finding(key, OK, f"nothing commands {robot} now; {silent} could{more}")
     elif not driving:

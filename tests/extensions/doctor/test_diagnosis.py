@@ -153,11 +153,20 @@ def test_what_keeps_a_robot_that_nothing_commands_is_reported() -> None:
         WARNING,
         "holozen controller Fred --resume, or r in the teleop",
     )
+    overruled = CommandSource("script@1", "DATA", held=True)
+    (finding,) = commands("cmd_vel", CommandStatus(held=True, sources=[overruled]))
+    assert finding.level == WARNING
     (finding,) = commands("cmd_vel", CommandStatus(), ["teleop", "controller"])
     assert (
         "now; controller, teleop could; if the controller is held: holozen controller --resume"
         in finding.text
     )
+
+
+def test_a_teleop_that_has_ended_and_a_robot_without_a_controller_are_no_warning() -> None:
+    (finding,) = commands("cmd_vel", CommandStatus(held=True))
+    assert (finding.level, finding.fix) == (OK, "")
+    assert "a controller after holozen controller --resume" in finding.text
 
 
 def test_a_stopped_robot_is_reported_with_what_releases_it() -> None:
