@@ -9,6 +9,7 @@ import threading
 
 import pytest
 
+from holozen.cli.publish import STEPS
 from holozen.messages import CommandStatus, JointState, Message, PoseStamped, Twist, Wrench
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
@@ -207,6 +208,20 @@ def test_of_a_paused_sim_it_says_so_instead_of_to_try_again(
     ), done.stderr
     assert done.stderr.endswith("; the sim is paused; `holozen sim play` continues it\n")
     assert verb(town, "service", "call", "resume").returncode == 0
+
+
+def test_a_single_command_to_a_paused_sim_says_that_only_steps_move_the_robot(
+    verb: Verb, town: Wire, robot: Robot
+) -> None:
+    assert verb(town, "sim", "pause").returncode == 0
+    try:
+        done, stops = (
+            verb(town, "topic", "pub", "cmd_vel", value, "--once") for value in (AHEAD, "{}")
+        )
+    finally:
+        assert verb(town, "sim", "play").returncode == 0
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (0, f"cmd_vel: {STEPS}")
+    assert "paused" not in stops.stderr
 
 
 def test_a_misspelt_key_is_refused_with_the_closest(verb: Verb, town: Wire, robot: Robot) -> None:
