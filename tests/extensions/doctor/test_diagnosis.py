@@ -3,6 +3,8 @@
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -11,6 +13,7 @@ from holozen.doctor.diagnosis import (
     OK,
     WARNING,
     Peer,
+    ask_peers,
     clocks,
     commands,
     duplicates,
@@ -161,6 +164,21 @@ def test_what_keeps_a_robot_that_nothing_commands_is_reported() -> None:
         "now; controller, teleop could; if the controller is held: holozen controller --resume"
         in finding.text
     )
+
+
+def test_a_node_whose_tokens_are_known_before_it_can_answer_is_asked_again() -> None:
+    class NewLink:
+        """Its nodes can answer from the fifth query on."""
+
+        queries = 0
+
+        def ask_all(self, _key: str, _timeout: float) -> list[SimpleNamespace]:
+            self.queries += 1
+            reply = SimpleNamespace(key="@holozen/abc/about", payload=json.dumps(ABOUT).encode())
+            return [reply] if self.queries >= 5 else []
+
+    bus: Any = NewLink()
+    assert ask_peers(bus, ["abc"]).keys() == {"abc"}
 
 
 def test_a_teleop_that_has_ended_and_a_robot_without_a_controller_are_no_warning() -> None:
