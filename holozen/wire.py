@@ -249,6 +249,11 @@ def resume_command(robot: str) -> str:
     return f"holozen controller {robot and f'{robot} '}--resume"
 
 
+def release_command(robot: str) -> str:
+    """The command that ends the software stop of a robot."""
+    return f"holozen release {robot}".strip()
+
+
 def topic(key: str) -> Topic | None:
     """The table's row for a key, with or without a robot's name before it."""
     last = key.rpartition("/")[2]

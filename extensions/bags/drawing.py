@@ -161,15 +161,24 @@ def _figure(found: Tracks, title: str, shapes: Mapping[str, Sequence[Point]]) ->
     path, panels = left.subplots(), right.subplots(len(PANELS), 1, sharex=True)
     for index, track in enumerate(found.odometry.values()):
         if shape := shapes[track.key]:
-            path.plot(*zip(*closed(shape), strict=True), "--", color=f"C{index % 10}", linewidth=1)
+            corners = tuple(zip(*closed(shape), strict=True))
+            wished = f"{track.key}: wished path"
+            path.plot(*corners, "--", color=f"C{index % 10}", linewidth=1, label=wished)
         _draw_path(path, track, f"C{index % 10}")
         for panel, (column, _) in zip(panels, PANELS, strict=True):
             panel.plot(
-                track.column(0), track.column(column), color=f"C{index % 10}", label=track.key
+                track.column(0),
+                track.column(column),
+                color=f"C{index % 10}",
+                label=f"{track.key}: measured",
             )
             if command := found.commands.get(track.key.removesuffix("odom") + "cmd_vel"):
                 panel.plot(
-                    command.column(0), command.column(column), ":", color="0.4", label=command.key
+                    command.column(0),
+                    command.column(column),
+                    ":",
+                    color="0.4",
+                    label=f"{command.key}: commanded",
                 )
     path.set(xlabel="x in m", ylabel="y in m", aspect="equal")
     path.legend()

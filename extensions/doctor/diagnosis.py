@@ -4,6 +4,7 @@ Each check yields findings; `diagnose` runs them all, in order.
 """
 
 import contextlib
+import itertools
 import json
 import math
 import os
@@ -35,6 +36,7 @@ OK, WARNING, ERROR = "ok", "warning", "error"
 # s to reach a router, to find other nodes, and to listen to robots
 OPEN, FIND, LISTEN = (0.8, 0.6, 1.0)
 ANSWER = 1.0  # s for nodes to answer; a busy machine takes long
+PAUSE = 0.02  # s until nodes that have not answered are asked again
 ROUNDS = 3  # queries to each node; the fastest answer measures its clock best
 # s of offset; from 0.5 s on, stamps are refused (wire.MAX_STAMP_AGE)
 CLOCK_WARNING, CLOCK_ERROR = (0.05, 0.5)
@@ -225,7 +227,8 @@ def nodes(connection: Connection) -> Iterator[Finding]:
         robots = Robots(bus, endpoints)
         yield from addresses(connection, bus.connected(), bus.others_listen())
         yield from silent(bus.silent())
-        peers = ask_peers(bus) if bus.connected() else {}
+        sessions = {end.session for end in endpoints if end.kind == "node"}
+        peers = ask_peers(bus, sessions) if bus.connected() else {}
         yield from versions(endpoints, peers, version("holozen"))
         yield from hidden(bus.hidden() if bus.connected() else ())
         yield from clocks(peers.values())
@@ -346,22 +349,31 @@ class Peer(NamedTuple):
         return f"{self.node} (pid {self.pid} on {self.host})"
 
 
-def ask_peers(bus: "Bus") -> dict[str, Peer]:
+def ask_peers(bus: "Bus", known: Collection[str] = ()) -> dict[str, Peer]:
     """Session -> its node, for all nodes that answer. Clock offsets are taken at half the round
-    trip, as NTP does.
+    trip, as NTP does. The nodes of the sessions that are `known` are asked again for a while: on a
+    new link a node's tokens may come before what answers, and a busy machine answers late.
     """
     found: dict[str, Peer] = {}
-    for _ in range(ROUNDS):
+    deadline = time.monotonic() + 2 * ANSWER
+    for asked in itertools.count(1):
         before, began = time.time(), time.monotonic()
         for reply in bus.ask_all(graph.ALL_NODE_INFO, ANSWER):
             now = time.time()
             if not isinstance(reply, bytes) and (
                 peer := read_peer(reply.key, reply.payload, before, now)
             ):
-                known = found.get(peer.session)
-                found[peer.session] = peer if known is None or peer.error < known.error else known
-        if time.monotonic() - began > ANSWER / 2:
-            break  # some node did not answer, and would not next time
+                best = found.get(peer.session)
+                found[peer.session] = peer if best is None or peer.error < best.error else best
+        now = time.monotonic()
+        if found.keys() >= set(known):
+            # a slow round: some node did not answer, and would not next time
+            if asked >= ROUNDS or now - began > ANSWER / 2:
+                break
+        elif now > deadline:
+            break
+        else:
+            time.sleep(PAUSE)
     return found
 
 
@@ -561,19 +573,26 @@ def commands(key: str, status: "CommandStatus", writers: Iterable[str] = ()) -> 
     """The findings about the sources that command the robot at `key`; `writers` are the nodes that
     could.
     """
-    robot, name = status.name or "the robot", key.rpartition("/")[0]
+    robot, name, writers = status.name or "the robot", key.rpartition("/")[0], {*writers}
     if status.stopped:
         text = f"{robot} is stopped by {status.stopped}, and ignores all commands"
         yield Finding(key, WARNING, text, f"holozen release {name}".strip())
     driving = sorted((source for source in status.sources if source.rate >= DRIVES), key=_rank)
     resume = f"{resume_command(name)}, or r in the teleop"
-    if not driving and status.held:
+    waits = "controller" in writers or any(source.held for source in status.sources)
+    if not driving and status.held and waits:
         text = (
-            f"{robot} stands still: a person drove it, so the controller waits, and so do "
-            "scripts that it overruled"
+            f"{robot} stands still: somebody drove or stopped it, so the controller, and scripts "
+            "that were overruled, wait"
         )
         yield Finding(key, WARNING, text, resume)
-    elif not driving and (silent := listed({*writers})) != "none":
+    elif not driving and status.held:
+        text = (
+            f"nothing commands {robot} since somebody drove or stopped it; `holozen teleop` does, "
+            f"and a controller after {resume}"
+        )
+        yield Finding(key, OK, text)
+    elif not driving and (silent := listed(writers)) != "none":
         more = f"; if the controller is held: {resume}" if "controller" in writers else ""
         yield Finding(key, OK, f"nothing commands {robot} now; {silent} could{more}")
     elif not driving:

@@ -188,9 +188,9 @@ class Verifier:
         if self.list_error:
             return f"unproven: {self.list_error}"
         if len(proof) != SIGNATURE or sample.stamp is None:
-            return "unproven: it is not signed"
+            return "unproven: it is not signed; start its sender with --secure"
         if name not in self._known:
-            return f"unproven: {name!r} may not command"
+            return f"unproven: {name!r} may not command; `holozen secure show` lists who may"
         top, end, key = self._known[name]
         if PRIORITIES.index(sample.priority) < top:
             return (

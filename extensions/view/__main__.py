@@ -236,8 +236,8 @@ def _addresses(
             yield f"{scheme}://127.0.0.1:{port}/"
             return
         yield (
-            f"port {port} of {args.host} is open to the network; anyone with this address may "
-            f"{may} the robots:"
+            f"whoever can reach port {port} of {args.host} and has this address may {may} the "
+            "robots:"
         )
         host = host if args.host not in ALL else socket.gethostname()
     yield f"{scheme}://{host}:{port}/{token and f'?token={token}'}"

@@ -33,7 +33,8 @@ PATIENCE = 256  # messages that may wait for a page that does not read
 TIMEOUT = 2.0  # s for stop and release
 SMOOTH = 0.2  # of the newest delay in the one that is shown
 SLOW = (
-    f"the link to this page is too slow: this was sent up to {MAX_AGE:g} s ago or more; try again"
+    f"the link to this page is too slow: this took more than {MAX_AGE:g} s, and was not done; try "
+    "again"
 )
 OTHER_ROBOT = "another robot has taken this name; press again"
 LOOK_ONLY = "this view is read-only: it was started with --look-only"

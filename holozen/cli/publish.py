@@ -39,10 +39,10 @@ from holozen.transport.pubsub import Latest, RawPublisher, Subscription
 from holozen.transport.samples import Sample
 
 STOPS, STOP_EVERY = 5, 0.02  # s
-WAITING = "waiting for the robot: its beat is not heard yet"
+WAITING = "waiting for the robot: nothing was heard from it yet"
 NO_BEAT = (
-    "the robot is there, but does not beat: nothing was sent within {seconds:g} s; `holozen "
-    "doctor` looks why"
+    "nothing was sent: the robot is there, but nothing was heard from it within {seconds:g} s; "
+    "`holozen doctor` looks why"
 )
 NOTICE = 0.5  # s of waiting for a beat after which that is reported
 BEAT_PATIENCE = 5.0  # s to wait for a beat where no --max-wait is given
@@ -53,6 +53,11 @@ VERDICT_WITH_STATUS = 2.0  # s, where one was
 # s; a robot that stands may take the first command over a slow link for a late one
 AGAIN, AGAIN_AFTER = (5, 0.1)
 PAUSED = "; the sim is paused; `holozen sim play` continues it"
+STEPS = (
+    "the sim is paused: the robot moves in `holozen sim step` alone; after `holozen sim play`, "
+    "send it again"
+)
+STATE_PAUSED = 2  # of simulation_interfaces/msg/SimulationState
 LEFT = "; it has left, and its last command counts until the robot's timeout: try again in a moment"
 
 
@@ -115,6 +120,8 @@ def _run(
         return 0
     if feedback and feedback.refusal:
         return int(payload not in form.stops or not feedback.stands)
+    if status_key and matched and payload not in form.stops and _is_paused(bus, status_key):
+        report(f"{args.key}: {STEPS}")
     return int(matched > 0 and form.is_goal and _report_without_controller(bus, args.key))
 
 
@@ -360,22 +367,34 @@ def command_feedback(bus: Bus, key: str, is_velocity: bool = True) -> CommandFee
     """Feedback about this node's commands from the command status on `key`."""
 
     def more(driver: str) -> str:
-        from holozen import entities
-
-        ends = bus.endpoints()
-        sims = {end.session for end in on_key(ends, key, "pub")}
-        if entities.is_paused(bus, [end for end in ends if end.session in sims]):
+        if _is_paused(bus, key):
             return PAUSED
         # A driver without a node may be anyone's.
-        return LEFT if "@" in driver and driver not in {end.source for end in ends} else ""
+        nodes = {end.source for end in bus.endpoints()}
+        return LEFT if "@" in driver and driver not in nodes else ""
 
-    read = partial(_status, Registry().find("holozen/msg/CommandStatus"))
+    read = partial(_read, Registry().find("holozen/msg/CommandStatus"))
     latest: Latest[Any] = Latest(Subscription(bus.subscribe_raw(key, depth=1), read))
     return CommandFeedback(bus.source, key, latest, is_velocity, more=more)
 
 
-def _status(kind: Interface, sample: Sample) -> Any:
-    """A CommandStatus, defined by `kind`, as an object; a newer sim may send more fields. Raises
+def _is_paused(bus: Bus, status_key: str) -> bool:
+    """Whether a sim that publishes the command status on this key is paused. One that does not
+    answer is not.
+    """
+    ends = bus.endpoints()
+    sims = {end.session for end in on_key(ends, status_key, "pub")}
+    told = [end for end in on_key(ends, "simulation_status", "pub") if end.session in sims]
+    kind = Registry().find("holozen/msg/SimulationStatus") if told else None
+    for sample in bus.last_messages(told):
+        with contextlib.suppress(CodecError):
+            if kind and _read(kind, sample).state == STATE_PAUSED:
+                return True
+    return False
+
+
+def _read(kind: Interface, sample: Sample) -> Any:
+    """A message defined by `kind`, as an object; a newer sim may send more fields. Raises
     CodecError.
     """
     if sample.encoding.startswith(WIRES["cdr"]):

@@ -111,8 +111,8 @@ def _parts(args: argparse.Namespace, has_terminal: bool) -> dict[str, list[str]]
 
 
 def _read_files(args: argparse.Namespace) -> None:
-    """Read the files that parts are given, so that none starts beside one that cannot. Raises
-    Failure.
+    """Read the files that parts are given, and check what they hold, so that no part starts beside
+    one that cannot. Raises Failure.
     """
     if args.goals:
         try:
@@ -124,13 +124,17 @@ def _read_files(args: argparse.Namespace) -> None:
     from holozen.robot.errors import RobotError
     from holozen.robot.files import loading, reader
     from holozen.robot.files.sdf_world import load_world
+    from holozen.robot.requirements import drivable, require_names
 
     reader.start(loading)
     try:
         if args.world:
             load_world(args.world, dict(args.package))
-        for path, _ in args.robot:
-            loading.load(path, packages=dict(args.package), allow_env=args.allow_env)
+        models = []
+        for path, name in args.robot:
+            model = loading.load(path, packages=dict(args.package), allow_env=args.allow_env)
+            models.append((drivable(model, path, args.drive), name))
+        require_names(models)
     except RobotError as error:
         raise Failure(str(error)) from None
     finally:

@@ -26,7 +26,7 @@ from holozen.command.motion import AppliedForce, AppliedForces, Motion, is_stop
 from holozen.command.outcome import Decision, Outcome, refusal
 from holozen.limits import STOP
 from holozen.transport.samples import PRIORITIES
-from holozen.wire import COMMAND_SILENCE, resume_command
+from holozen.wire import COMMAND_SILENCE, release_command, resume_command
 
 # no source ranks above a person: stronger priorities count as this one
 PERSON = PRIORITIES.index("INTERACTIVE_HIGH")
@@ -34,10 +34,13 @@ PERSON = PRIORITIES.index("INTERACTIVE_HIGH")
 AUTOPILOT = PRIORITIES.index("DATA_LOW")
 MAX_NAMES = 100  # sources of a rank with a record of their own: names come over the wire
 MAX_PARTS = 100  # sources whose moving topics or joints are known
-LET_GO = "it commanded while another drove or the robot was stopped; send a stop{or_wait}"
+LET_GO = (
+    "it commanded while another drove or the robot was stopped; let go of the keys, or send zeros"
+    "{or_wait}, then drive"
+)
 WAITS = "another source took over; `{resume}` lets it drive again"
-BY_STOP = "by {by}; `holozen release` lets it drive again"
-VOID = "it was sent before the sim was played or reset, or the robot was spawned"
+BY_STOP = "by {by}; `{release}` lets it drive again"
+VOID = "it was sent before the sim was played or reset, or the robot was spawned; send it again"
 UNKNOWN_CALLER = "an unknown caller"
 
 
@@ -326,7 +329,7 @@ class Arbiter:
             return self._decision(Outcome.STOPPED, None).reason
         driver = self.driver(now)
         if driver and driver.source.rank < AUTOPILOT and not is_stop(driver.motion):
-            return f"{driver.source.name} drives; stop first"
+            return f"{driver.source.name} drives; stop it first"
         return ""
 
     # Commands
@@ -563,15 +566,18 @@ class Arbiter:
     def _decision(self, outcome: Outcome, driver: Driver | None) -> Decision:
         """The decision with its reason, in words of the person who reads it."""
         if outcome is Outcome.STOPPED:
-            return refusal(outcome, BY_STOP.format(by=self.state.stopped_by))
+            return refusal(
+                outcome,
+                BY_STOP.format(by=self.state.stopped_by, release=release_command(self._robot)),
+            )
         if outcome is Outcome.MUST_LET_GO:
             limit = self._silence_limit()
             return refusal(
                 outcome,
-                LET_GO.format(or_wait="" if limit is None else f" or be silent for {limit:g} s"),
+                LET_GO.format(or_wait="" if limit is None else f" or nothing for {limit:g} s"),
             )
         if outcome is Outcome.OVERRULED and driver:
-            return refusal(outcome, f"{driver.source.name} drives")
+            return refusal(outcome, f"{driver.source.name} drives; it has to stop first")
         if outcome is Outcome.WAITS_FOR_RESUME:
             return refusal(outcome, WAITS.format(resume=resume_command(self._robot)))
         if outcome is Outcome.VOID:

@@ -34,7 +34,7 @@ from holozen.odometry import odometry, transform
 from holozen.rotation import from_axis_angle
 from holozen.transport.graph import Endpoint, on_key
 from holozen.transport.pubsub import Subscription
-from holozen.wire import COMMAND_SILENCE, MAX_COMMAND_BYTES, key_for, robot_name
+from holozen.wire import COMMAND_SILENCE, MAX_COMMAND_BYTES, key_for, release_command, robot_name
 
 STATUS_EVERY = 0.1  # s
 MAX_SCAN = 500_000  # bytes; 10,000 ranges as text take some 200,000
@@ -125,7 +125,7 @@ class Base:
             self._arbiter.stop(by, now)
             self._stops.write(robot, by)
             still = f"{robot or 'the robot'} is still stopped by {by}"
-            report(f"{bus.node}: {still}; `holozen release` lets it drive again")
+            report(f"{bus.node}: {still}; `{release_command(robot)}` lets it drive again")
         self._guard, served, write = (
             guard,
             [Served(robot, self._name)],

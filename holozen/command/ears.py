@@ -19,7 +19,7 @@ PASS = 0.05  # s; the longest pass of a loop that keeps its rate
 PATIENCE = 10.0  # s for an answer, which is late by then, and ends the deafness
 BY = "itself, since it may not hear a stop"
 DEAF = (
-    "its own session has not answered for {limit:g} s, so a stop may not get through: {robots} "
+    "it has not heard its own messages for {limit:g} s, so it may not hear a stop either: {robots} "
     "until `holozen release`"
 )
 

@@ -18,12 +18,18 @@ LIMITED = "over the limits"  # prefix of the sim's reason when it drives slower 
 # prefixes of its reasons for commands that took too long
 LATE = (Outcome.HELD_UP.value, Outcome.OLD.value)
 OVERRULED = "overruled"  # prefix of its reason when a higher source drives
+STOPPED = "the robot is stopped by "
 DRIVES = " drives"
-SILENT = "its status no longer comes: its sim has ended, hangs, or cannot be reached"
+STOP_FIRST = "; it has to stop first"
+SILENT = (
+    "its status no longer comes: its sim has ended, hangs, or cannot be reached; `holozen doctor` "
+    "looks why"
+)
+NOT_RECEIVED = "the sim has not received it: it hangs, or is flooded; `holozen doctor` looks why"
 ONLY_TURNS = "linear.y is ignored: this robot's drive only goes forward, backward and turns"
 HELD = "held, since another source took over"
-RESUME = "; `{command}` lets it drive again"
-HOLDS = "{driver} is held now, as by any stop of an equal; `{command}` lets it drive again"
+AGAIN = "; `{command}` lets it drive again"
+HOLDS = "this stop also holds {driver}, which drove; `{command}` lets it drive again"
 
 
 def verdict(status: Any, source: str) -> str | None:
@@ -36,7 +42,7 @@ def verdict(status: Any, source: str) -> str | None:
     if own_refusal == status.last_refusal:
         own_refusal = ""
     if status.stopped:
-        return f"{status.stopped} has set the software stop"
+        return f"{STOPPED}{status.stopped}"
     if status.obeyed == source or (mine and mine.obeyed):
         return own_refusal if own_refusal.startswith(LIMITED) else ""
     kind = own_refusal.partition(":")[0]
@@ -82,7 +88,8 @@ class CommandFeedback:
     ) -> None:
         self._source, self._latest, self._is_velocity = source, latest, is_velocity
         self._report, self._more = report, more
-        self._resume = wire.resume_command(key.rpartition("/")[0])
+        robot = key.rpartition("/")[0]
+        self._resume, self._release = wire.resume_command(robot), wire.release_command(robot)
         self._reported = self._driver = ""
         self._judged: Any = None  # the last status that was judged
         self._why: str | None = None  # its verdict
@@ -129,8 +136,10 @@ class CommandFeedback:
         # each names another age
         if why != self._reported and not (is_late and self._reported.startswith(LATE)):
             if why and not why.startswith(LIMITED):
-                resume = RESUME.format(command=self._resume) if why == HELD else ""
-                self._tell(f"not obeyed: {why}{resume}", None if is_late else self._driver)
+                stopped = why.startswith(STOPPED)
+                command = self._resume if why == HELD else self._release if stopped else ""
+                advice = AGAIN.format(command=command) if command else ""
+                self._tell(f"not obeyed: {why}{advice}", None if is_late else self._driver)
             else:
                 self._tell(why or "obeyed again")
         if (
@@ -155,7 +164,7 @@ class CommandFeedback:
                 break  # it says nothing of what it accepts
             if time.monotonic() > deadline:
                 if self._latest.read()[1] < FRESH and self._is_velocity:
-                    self.refusal = "the sim has not received it; does anything flood it?"
+                    self.refusal = NOT_RECEIVED
                     self._report(f"not obeyed: {self.refusal}")
                 break
         self.told()
@@ -180,14 +189,15 @@ class CommandFeedback:
 
     def _tell(self, text: str, driver: str | None = None) -> None:
         """Report a text after those before it, with what `more` says of a driver; None: nothing."""
+        first = STOP_FIRST if driver else ""
         if not self._more:
-            return self._report(text)
+            return self._report(f"{text}{first}")
         more, before = self._more, self._telling
 
         def tell() -> None:
             if before:
                 before.join()
-            self._report(text if driver is None else f"{text}{more(driver)}")
+            self._report(text if driver is None else f"{text}{more(driver) or first}")
 
         self._telling = threading.Thread(target=tell, daemon=True)
         return self._telling.start()

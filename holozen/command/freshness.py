@@ -29,13 +29,24 @@ BEGIN_AGE = 0.15
 MAX_KNOWN = 256
 AGES = (0.05, COMMAND_SILENCE)  # s; the range of `max_age`
 
-OLD = "it was sent up to {age:.2f} s ago; at most {limit:g} s"
-WAITED = "it waited up to {age:.1f} s for this process; at most {limit:g} s"
-GONE = "its sender has left, or is not known yet"
-OUT_OF_ORDER = "number {number} came after {last}"
-HELD_UP = "it was sent up to {age:.2f} s ago, too long to begin with; send another"
-NO_ECHO = "its sender has not heard this robot yet; send another"
-UNSTAMPED = "this sender stamps its commands"
+OLD = (
+    "it may be {age:.2f} s old, and the limit is {limit:g} s; send it again, over a faster network "
+    "if that goes on"
+)
+WAITED = (
+    "it may have waited {age:.1f} s for this busy process, and the limit is {limit:g} s; send it "
+    "again"
+)
+GONE = "its sender has ended, or has only just started; send it again"
+OUT_OF_ORDER = "a newer command of its sender came before it, and counts instead"
+HELD_UP = (
+    "a robot starts by a command of the last {limit:g} s, and this one may be {age:.2f} s old; "
+    "send another"
+)
+NO_ECHO = "its sender has not heard from this robot yet; send another in a moment"
+UNSTAMPED = (
+    "it has no stamp, but other commands under this name have one; give this program another name"
+)
 
 
 class Senders(Protocol):
@@ -224,8 +235,7 @@ class Freshness(Generic[M]):
             self._held_up.pop(stream, None)
             return Judged(received, sent, age)
         if before and position <= before:
-            disorder = OUT_OF_ORDER.format(number=position.number, last=before.number)
-            return Judged(received, sent, age, refusal(Outcome.OUT_OF_ORDER, disorder))
+            return Judged(received, sent, age, refusal(Outcome.OUT_OF_ORDER, OUT_OF_ORDER))
         return Judged(received, sent, age, self._refuse_late(stream, age, source_of(received), now))
 
     def _refuse_late(self, stream: Stream, age: float, source: str, now: float) -> Decision | None:
@@ -239,7 +249,7 @@ class Freshness(Generic[M]):
             arbiter.moves(source, now) for arbiter in self._arbiters
         )
         if begins and now - age <= self._note_late(stream, now):
-            return refusal(Outcome.HELD_UP, HELD_UP.format(age=age))
+            return refusal(Outcome.HELD_UP, HELD_UP.format(age=age, limit=BEGIN_AGE))
         self._held_up.pop(stream, None)
         return None
 

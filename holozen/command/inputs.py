@@ -53,7 +53,10 @@ REPORT_EVERY = 1.0  # s
 MAX_LINES = 10
 M = TypeVar("M", bound=Message)
 
-PARTIAL_STOP = "part: partial stop: this source still moves another joint or topic"
+PARTIAL_STOP = (
+    "part: its sender still moves another joint or topic, so this zero stops nothing; send zeros "
+    "there too"
+)
 # one part, whichever of the robot's keys a velocity comes on: a zero on any of them ends it
 TWIST = "cmd_vel"
 UNPROVEN = "unproven"  # the kind of refusal of a command without proof of its sender's name
@@ -147,7 +150,11 @@ class Input(Generic[M]):
         not.
         """
         if abs(command.age) > MAX_STAMP_AGE:
-            return f"stale: its stamp is {command.age:.1f} s old; at most {MAX_STAMP_AGE} s"
+            when = "old" if command.age > 0 else "in the future"
+            return (
+                f"stale: its header.stamp is {abs(command.age):.1f} s {when}, and the limit is "
+                f"{MAX_STAMP_AGE} s; set the clocks by NTP, or leave the stamp at 0"
+            )
         return ""
 
     def _obey(self, command: Command[M]) -> None:

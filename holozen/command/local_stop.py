@@ -30,7 +30,7 @@ HELD_UP = 0.3  # s without a pass of the loop after which a stop is answered for
 # s for the processes of this machine to answer a stop; meanwhile those elsewhere are not asked
 ANSWERS = 0.6
 LARGEST = 1 << 16  # bytes of a request, and of a reply
-HANGS = "its process hangs, and stands from the moment that it goes on"
+HANGS = "its process hangs and drives nothing; it is still stopped when the process goes on"
 TURNS = "its process hangs, and has no guard that stops its wheels: use the robot's own switch"
 
 

@@ -16,10 +16,10 @@ from holozen.wire import key_for, resume_command
 MAX_REQUESTS = 16  # of one service answered per poll; a flood of them must not stall the steps
 # s; a command that was sent before a resume may be read so much after that was wanted
 SIMULTANEOUS = 0.05
-OUTDATED = "this {verb} may have been sent before {event}; send it again if that is still to end"
+OUTDATED = "this {verb} may have been sent before {event}, so it is void; send it again"
 RELEASED = (
-    "sources that commanded during the stop have to let go first; an autopilot also waits "
-    "for `{resume}`"
+    "whoever commanded during the stop lets go of the keys first; a controller also waits for "
+    "`{resume}`"
 )
 
 
@@ -77,7 +77,7 @@ class RobotServices:
             self._stop.answer_pending(MAX_REQUESTS)
             for server in (self._release, self._resume):
                 server.refuse_waiting(
-                    f"a stop came at the same time; {self._namespace or 'the robot'} is stopped"
+                    f"a stop came at the same time: {self._namespace or 'the robot'} is stopped"
                 )
         for server in (self._release, self._resume):
             server.answer_pending(MAX_REQUESTS)

@@ -33,7 +33,7 @@ BEAT, GOAL_BEAT = "beat", "goal_beat"
 """The names of the beats of robots, and of those that drive robots to goals: with --secure, these
 may not beat as robots do.
 """
-WAITING = "{key}: waiting for the robot: {receivers} sent no beat yet, so nothing but stops is sent"
+WAITING = "{key}: waiting for the robot: nothing was heard from it yet, so only stops are sent"
 NOTICE = 0.5  # s of waiting after which a publisher says so
 
 
@@ -334,14 +334,14 @@ class Echoes(Declared):
         long wait for a beat is reported once.
         """
         self.settle()
-        if not (receivers := self.awaited):
+        if not self.awaited:
             self._waits_since, self._has_reported = 0.0, False
             return True
         now = time.monotonic()
         self._waits_since = self._waits_since or now
         if not self._has_reported and now - self._waits_since > NOTICE:
             self._has_reported = True
-            report(WAITING.format(key=self.key, receivers=receivers))
+            report(WAITING.format(key=self.key))
         return False
 
     def close(self) -> None:

@@ -164,10 +164,12 @@ class ConnectionAttempts:
 
 
 def exposure(endpoints: Iterable[str]) -> str:
-    """A warning, to follow a node's name, about endpoints that other machines can reach."""
+    """A warning, to follow a node's name, about endpoints beyond loopback. It does not say who can
+    reach them: that is up to firewalls and, in a container, to the ports that are published.
+    """
     where = ", ".join(endpoints)
-    risk = "anyone who can reach it can drive, stop and delete robots, and set parameters"
-    return f"listens at {where}, open to the network: {risk}"
+    risk = "whoever can reach it can drive, stop and delete robots, and set parameters"
+    return f"listens at {where}, and asks for no password or certificate: {risk}"
 
 
 def is_open(endpoint: str) -> bool:

@@ -4,7 +4,7 @@ import enum
 from typing import NamedTuple
 
 from holozen.messages import CommandStatus
-from holozen.wire import resume_command
+from holozen.wire import release_command, resume_command
 
 
 class Cause(enum.Enum):
@@ -42,6 +42,7 @@ class YieldPolicy:
 
     def __init__(self, source: str, held: bool = False, robot: str = "") -> None:
         self._source = source
+        self._release = release_command(robot)
         self._how = f"resume with `{resume_command(robot)}` or press r in the teleop"
         # resumes at the last status; those before the first status do not count
         self._resumed: int | None = None
@@ -53,7 +54,7 @@ class YieldPolicy:
         """Why this controller does not drive, and what would let it; empty while it may."""
         if self.stopped:
             return (
-                f"yields: the robot is stopped by {self.stopped}; `holozen release` ends that, "
+                f"yields: the robot is stopped by {self.stopped}; `{self._release}` ends that, "
                 f"then {self._how}"
             )
         if self.yielded is None:

@@ -26,7 +26,7 @@ from holozen.wire import COMMAND_SILENCE, MAX_COMMAND_BYTES, key_for
 from .actuators import Actuators
 from .identity import Identity
 
-NO_DRIVE = "no drive: this robot is moved by forces, on {keys}"
+NO_DRIVE = "no drive: cmd_vel moves no wheels of this robot; publish forces on {keys}"
 
 
 class CommandRules(Struct):

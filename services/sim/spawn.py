@@ -11,9 +11,9 @@ from holozen.console import report
 from holozen.entities import has_no_room
 from holozen.robot.errors import RobotError
 from holozen.robot.files.loading import load
-from holozen.robot.keys import command_key
-from holozen.robot.model import Camera, Pushed, RobotModel, Sensor, driven, takes
-from holozen.robot.rigid import PlacedShape, advised_drive, lowest, lump
+from holozen.robot.model import Camera, Pushed, RobotModel, Sensor, takes
+from holozen.robot.requirements import drivable, require_names
+from holozen.robot.rigid import PlacedShape, lowest, lump
 from holozen.rotation import from_rpy
 from holozen.suggest import listed
 from holozen.wire import key_for
@@ -70,15 +70,7 @@ def spawn_all(entities: Entities, args: argparse.Namespace, mine: Shard | None =
     robots: list[tuple[Path, str]] = args.robot or [(data.find("urdf", "hb_bot.urdf.xacro"), "")]
     read = {path: _read(path, args) for path in dict.fromkeys(path for path, _ in robots)}
     models = [read[path] for path, _ in robots]
-    # Robots without names may be told apart by the namespaces in their files.
-    names = [
-        (name, command_key(model, name)) for model, (_, name) in zip(models, robots, strict=True)
-    ]
-    for name, key in names:
-        if (same := names.count((name, key))) > 1:
-            raise RobotError(
-                f"{same} robots are called {name!r}; give each a name: --robot FILE=NAME"
-            )
+    require_names([(model, name) for model, (_, name) in zip(models, robots, strict=True)])
     added, y = list[str](), 0.0
     for number, (model, (path, name)) in enumerate(zip(models, robots, strict=True)):
         reach = max(map(_reach, lump(model).collisions), default=0.0)
@@ -129,19 +121,7 @@ def _read(path: Path, args: argparse.Namespace) -> RobotModel:
             f"sim: warning: {path}: has a drive of its own, which is used; --drive {args.drive} "
             "is not"
         )
-    elif args.drive:
-        model = driven(model, args.drive)
-    if model.drive is None:
-        advice = "move the whole body: --drive planar_move"
-        if advised_drive(model) == "omni":
-            advice = f"drive its omni wheels: --drive omni; or {advice}"
-        raise RobotError(f"{path}: no plugin drives it; add one, or {advice}")
-    if not lump(model).collisions:
-        raise RobotError(
-            f"{path}: no collision shape to stand on; give a link a <box>, <cylinder>, <sphere> "
-            "or <mesh>"
-        )
-    return model
+    return drivable(model, path, args.drive)
 
 
 def _valid_name(name: str) -> str:

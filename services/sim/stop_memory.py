@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable
 
 from holozen.command.stop_files import StopFiles
 from holozen.console import report
-from holozen.wire import MAX_ENTITIES
+from holozen.wire import MAX_ENTITIES, release_command
 
 from .commands import Arbiters
 
@@ -41,7 +41,7 @@ class StopMemory:
         self.keep(wire_name)
         if arbiters.stopped_by:
             still = f"{wire_name or 'the robot'} is still stopped by {arbiters.stopped_by}"
-            report(f"sim: {still}; `holozen release` lets it drive again")
+            report(f"sim: {still}; `{release_command(wire_name)}` lets it drive again")
         if len(self._last) > MAX_ENTITIES:
             self._forget_one(living)
 

@@ -40,7 +40,9 @@ MIN_WAIT, MAX_WAIT = 0.001, 0.05  # s between two passes
 REDRAW, LINE_EVERY, RETRY = 0.1, 1.0, 0.01  # s between pictures, lines and attempts
 STALL = 0.4  # s without a pass; keys typed during that time are outdated
 ENDS = (*SIGNALS, signal.SIGQUIT)  # the signals that end it
-HELD_KEYS_NEEDED = "this terminal does not report key releases, which --deadman needs"
+HELD_KEYS_NEEDED = (
+    "--deadman needs a terminal that reports key releases, such as kitty or foot; this one does not"
+)
 
 
 class TeleopError(Exception):

@@ -11,7 +11,7 @@ from msgspec import Struct
 
 from holozen.messages import CommandStatus
 from holozen.suggest import listed, suggest
-from holozen.wire import VELOCITIES, resume_command
+from holozen.wire import VELOCITIES, release_command, resume_command
 
 from .control.layouts import Layout
 from .input.kitty import Key
@@ -133,19 +133,21 @@ def _hold(session: Session, until: float, stop: threading.Event) -> str:
             return session.warning or why
         heard |= status.obeyed == session.bus.source or not any(session.mapper.motion)
         if status.name and not heard and now - began > UNHEARD:
-            return "the sim has received none of the commands; does anything flood it?"
+            return "the sim has received no command; does it hang? `holozen doctor` looks why"
     return ""
 
 
 def _not_obeyed(session: Session, status: CommandStatus) -> str:
+    robot = session.client.key.rpartition("/")[0]
     if status.stopped:
-        return f"stopped by {status.stopped}; `holozen release` lets the robot drive again"
+        release = release_command(robot)
+        return f"stopped by {status.stopped}; `{release}` lets the robot drive again"
     if not any(session.mapper.motion):
         return ""
     if session.client.odom.is_paused:
         return "the sim is paused; `holozen sim play` continues it"
     if any(source.held for source in status.sources if source.source == session.bus.source):
-        command = resume_command(session.client.key.rpartition("/")[0])
+        command = resume_command(robot)
         return f"the robot was stopped or taken over; `{command}` gives it back"
     if status.obeyed not in ("", session.bus.source):
         return f"{status.obeyed} drives the robot, not this script"

@@ -31,7 +31,7 @@ RESUME_TIMEOUT = 0.2  # s; the keys wait while the sim is asked
 UNSEEN = "the window lost focus: stopped"
 BLIND = "odom was lost: stopped; press a key again to drive"
 RESET = "the robot was reset: stopped; press a key again to drive"
-WAITING = "waiting for the robot: its beat is not heard yet"
+WAITING = "waiting for the robot: nothing was heard from it yet"
 SWITCHING = "switching to the next robot: press the key again"
 
 

@@ -24,7 +24,7 @@ from tests.fleet import Fleet
 
 HERE = Path(__file__).parent
 THREADS = "(rx: (worker_threads: 16))"
-DEAF = "its own session has not answered for"
+DEAF = "it has not heard its own messages for"
 
 
 class Target:

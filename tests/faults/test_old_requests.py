@@ -26,7 +26,7 @@ from .proxy import Proxy
 
 LONG = 60.0  # s that a caller waits
 Call = Callable[..., subprocess.CompletedProcess[str]]
-AGAIN = "; send it again if that is still to end"
+AGAIN = ", so it is void; send it again"
 
 
 @pytest.fixture
@@ -101,7 +101,7 @@ def test_a_release_from_before_a_stop_leaves_the_robot_stopped_also_where_it_was
         status = sim.latest("cmd_vel_status", CommandStatus)
         now = wait_for(lambda status=status: status.read()[0])  # type: ignore[misc]
         assert now and now.stopped == sim.source
-        assert trigger(far, "release").message.startswith("sources that commanded")
+        assert trigger(far, "release").message.startswith("whoever commanded")
 
 
 def test_a_goal_that_is_old_or_whose_client_waits_no_longer_moves_nothing(
@@ -179,7 +179,7 @@ def test_a_play_from_before_a_pause_leaves_the_sim_paused(sim: Bus, far: Bus, pr
         lambda: set_state(far, State.STATE_PLAYING),
         lambda: set_state(sim, State.STATE_PAUSED),
     )
-    assert refused.startswith("this may have been sent before the sim was last paused")
+    assert refused.startswith("this play may have been sent before the sim was last paused")
     reply = sim.call(
         "get_simulation_state", si.GetSimulationStateRequest(), si.GetSimulationStateReply
     )

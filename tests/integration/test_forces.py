@@ -144,7 +144,7 @@ def test_three_forces_push_one_robot_any_way_and_each_stop_ends_them(lesson: Les
     assert abs(speeds(lesson.push(60, turn=2.0))[2]) > 0.5
     person = lesson.bus.publisher("hb_bot_2/cmd_vel", Twist, "INTERACTIVE_HIGH")
     wait_for(lambda: person.matched)
-    reason = "no drive: this robot is moved by forces, on hb_bot_2/left_wheel_force"
+    reason = "no drive: cmd_vel moves no wheels of this robot; publish forces on hb_bot_2/left"
     lesson.status_when(
         lambda status: reason in status.last_refusal, lambda: person.put(Twist.planar(0.3))
     )

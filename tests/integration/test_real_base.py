@@ -280,7 +280,7 @@ def test_whatever_another_peer_sends_a_stop_reaches_the_wheels(
             with Process(attacks.words(kind, place)) as attacker:
                 attacker.wait_for_line("sent")
                 if kind == "patterns":
-                    own.base.wait_for_line("its own session has not answered for")
+                    own.base.wait_for_line("it has not heard its own messages for")
                     wait_for(lambda: own.speeds() == STANDS, what="the wheels to stop themselves")
                 stop = own.wire.run("stop", "lekiwi", within=60)
                 wait_for(lambda: own.speeds() == STANDS, what="the wheels to stop")

@@ -261,11 +261,11 @@ def test_an_autopilot_also_waits_for_resume_which_is_refused_during_the_stop(
 ) -> None:
     trigger(fred, "stop")
     with pytest.raises(
-        ServiceError, match=r"^stopped: by .*; `holozen release` lets it drive again$"
+        ServiceError, match=r"^stopped: by .*; `holozen release Fred` lets it drive again$"
     ):
         fred.resume()
     assert trigger(fred, "release").message.endswith(
-        "; an autopilot also waits for `holozen controller Fred --resume`"
+        "; a controller also waits for `holozen controller Fred --resume`"
     )
     fred.pass_time(0.8)
     flood.add("Fred/cmd_vel", Twist.planar(0.4), AUTOPILOT)
@@ -288,7 +288,7 @@ def test_a_robot_in_the_place_of_a_stopped_one_is_stopped(
     entities.delete(bus, "Ann")
     flood.add("Ann/cmd_vel", Twist.planar(0.4), PERSON)
     entities.spawn(bus, "Ann", SLOW_BOT, at)
-    sim.wait_for_line("`holozen release` lets it drive again")
+    sim.wait_for_line("`holozen release Ann` lets it drive again")
     assert refuses(ann, "stopped").stopped.startswith("test@")
     stands_for(ann, 0.5, 1e-5)  # it lands
     trigger(ann, "release")

@@ -19,6 +19,9 @@ from .processes import assert_one_line, parts_at, state_of, wait_for_none
 from .robots import Robot, moves, rests
 
 BOT = str(data.find("urdf", "hb_bot.urdf.xacro"))
+STILL = """<robot name="still"><link name="base"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><box size="1 1 1"/></geometry></collision></link></robot>"""
 PARTS = {"sim", "pose-service", "controller"}
 AT_MOST = 10.0  # s; it promises 2, and a busy machine gets more
 
@@ -169,6 +172,21 @@ def test_nothing_starts_beside_a_robot_that_is_broken(
     shown = started.raw if isinstance(started, Terminal) else started.err
     (line,) = filter(None, map(str.strip, shown.splitlines()))
     assert line.startswith("holozen up: ") and "broken.urdf" in line
+    assert parts_at(wire) == {}
+
+
+def test_nothing_starts_beside_robots_that_no_sim_takes(
+    wire: Wire, verb: Verb, tmp_path: Path
+) -> None:
+    (tmp_path / "still.urdf").write_text(STILL)
+    still = str(tmp_path / "still.urdf")
+    for robots, reason in (
+        ([f"{BOT}=Fred", f"{BOT}=Fred"], "2 robots are called 'Fred'; give each a name"),
+        ([BOT, BOT], "2 robots have no name; give each a name"),
+        ([still], "still.urdf: no plugin drives it; add one, or move the whole body"),
+    ):
+        words = [word for robot in robots for word in ("--robot", robot)]
+        assert_one_line(verb(wire, "up", *words), 1, "holozen up: ", reason)
     assert parts_at(wire) == {}
 
 

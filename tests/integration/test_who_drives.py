@@ -119,7 +119,7 @@ def test_resume_is_refused_while_a_person_drives_and_granted_at_once_after_a_sto
     robot: Robot, person: Hand, autopilot: Hand
 ) -> None:
     drive(robot, person, 0.3)
-    with pytest.raises(ServiceError, match=r"person@.* drives; stop first"):
+    with pytest.raises(ServiceError, match=r"person@.* drives; stop it first"):
         robot.resume()
     drive(robot, person, 0.3)
     drive(robot, person, 0.0)

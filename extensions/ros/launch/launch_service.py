@@ -50,6 +50,12 @@ POLL = 0.05  # s
 GRACE = ((signal.SIGINT, 1.0), (signal.SIGTERM, 0.5))  # s until the next signal, and to SIGKILL
 
 CHUNK = 65536  # bytes
+# the first lines of a traceback; the others are indented, but for its last one
+TRACEBACK = (
+    b"Fatal Python error: ",
+    b"Python runtime state: ",
+    b"Traceback (most recent call last)",
+)
 LONGEST_LINE = 1_000_000  # bytes that are kept until the end of a line arrives
 
 # stands for arguments that are known only when a function or an included file is executed
@@ -404,7 +410,9 @@ class Process:
         )
 
     def signal(self, number: int) -> None:
-        """Send a signal to its process group."""
+        """Send a signal to its process group, whose tracebacks of that are not forwarded."""
+        for pipe in self.pipes:
+            pipe.is_interrupted = True
         if self._popen.returncode is None:
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.killpg(self._popen.pid, number)
@@ -420,7 +428,12 @@ class Process:
 
 
 class Pipe:
-    """One output stream of a process, and where it is forwarded."""
+    """One output stream of a process, and where it is forwarded.
+
+    Attributes:
+        is_interrupted: Whether the process was sent a signal. From then on a traceback that ends in
+            KeyboardInterrupt is dropped: that is how a Python ends that was still loading.
+    """
 
     def __init__(
         self, name: str, source: IO[bytes], sink: IO[str], drops_output: Callable[[], bool]
@@ -428,6 +441,8 @@ class Pipe:
         self.source, self._sink, self._prefix = source, sink, f"[{name}] ".encode()
         self._drops_output = drops_output
         self._rest = b""
+        self.is_interrupted = False
+        self._traceback: list[bytes] = []  # its lines so far, while one comes after a signal
         os.set_blocking(source.fileno(), False)
 
     def read(self) -> bool:
@@ -443,16 +458,33 @@ class Pipe:
         return bool(data)
 
     def close(self) -> None:
-        """Forward an incomplete last line, and close."""
+        """Forward an incomplete last line, or traceback, and close."""
         self._write([self._rest] if self._rest else [])
-        self._rest = b""
+        self.is_interrupted, held = False, self._traceback
+        self._write(held)
+        self._rest, self._traceback = b"", []
         self.source.close()
 
     def _write(self, lines: list[bytes]) -> None:
+        if self.is_interrupted:
+            lines = [*self._without_interrupts(lines)]
         if lines:
             self._sink.flush()
             text = b"".join(self._prefix + line + b"\n" for line in lines)
             _write_all(self._sink, text, self._drops_output)
+
+    def _without_interrupts(self, lines: list[bytes]) -> Iterator[bytes]:
+        """The lines without those of tracebacks that end in KeyboardInterrupt."""
+        for line in lines:
+            if not self._traceback and not line.startswith(TRACEBACK):
+                yield line
+                continue
+            self._traceback.append(line)
+            if line.startswith(b"KeyboardInterrupt"):
+                self._traceback.clear()
+            elif line[:1].strip() and not line.startswith(TRACEBACK):  # its last line
+                yield from self._traceback
+                self._traceback.clear()
 
 
 def _write_all(sink: IO[str], text: bytes, drops_output: Callable[[], bool]) -> None:

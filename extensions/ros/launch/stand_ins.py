@@ -496,6 +496,12 @@ class Simulation(Action):
         ours = data.find("worlds", f"{Path(world).stem or 'empty'}.world")
         if not Path(world).is_file() and ours.is_file():
             world = str(ours)
+        if not Path(world).is_file():  # before anything starts
+            known = sorted(file.name for file in ours.parent.glob("*.world"))
+            raise LaunchError(
+                f"world {world!r}: there is no such file{suggest(world, known)}; holozen's own "
+                f"worlds are {listed(known)}"
+            )
         words = holozen_command(context, "sim", "--empty", "--world", world, *package_flags())
         report(f"launch: `holozen sim` replaces Gazebo; {SHOWN}")
         context.runner.start(

@@ -24,7 +24,7 @@ from ..simulation import NAMES, Simulation
 _OK = si.Result(si.Result.OK)
 FEEDBACK_EVERY = 0.1  # s
 OUTDATED = (
-    "this may have been sent before the sim was last paused; send it again if it is still to play"
+    "this play may have been sent before the sim was last paused, so it is void; send it again"
 )
 
 

@@ -10,7 +10,7 @@ import pytest
 from holozen.background import background
 from holozen.bus import Bus
 from holozen.cli.publish import LEFT
-from holozen.command.feedback import HELD, ONLY_TURNS, SILENT, verdict, verdict_on_part
+from holozen.command.feedback import HELD, ONLY_TURNS, SILENT, STOP_FIRST, verdict, verdict_on_part
 from holozen.messages import CommandSource, CommandStatus, Twist
 from holozen.testing import Wire, wait_for
 
@@ -34,7 +34,7 @@ def test_the_reason_is_the_sims() -> None:
             "let go first: x",
         ),
         (CommandStatus(sources=[CommandSource(ME, obeyed=True)]), ""),
-        (CommandStatus(obeyed=ME, stopped=TELEOP), f"{TELEOP} has set the software stop"),
+        (CommandStatus(obeyed=ME, stopped=TELEOP), f"the robot is stopped by {TELEOP}"),
         (CommandStatus(refused={"malformed": 1}, last_refusal=f"{ME}: not a Twist"), "not a Twist"),
         (CommandStatus(refused={"malformed": 1}, last_refusal=f"{TELEOP}: not a Twist"), None),
         (
@@ -72,7 +72,7 @@ def test_a_command_to_a_joint_that_is_accepted_after_a_refusal_is_obeyed() -> No
             CommandStatus(refused={"stale": 2}, last_refusal=f"{ME}: stale: it is old"),
             "stale: it is old",
         ),
-        (CommandStatus(stopped=TELEOP, **refused), f"{TELEOP} has set the software stop"),  # type: ignore[arg-type]
+        (CommandStatus(stopped=TELEOP, **refused), f"the robot is stopped by {TELEOP}"),  # type: ignore[arg-type]
     ]:
         assert verdict_on_part(status, before, ME) == why
 
@@ -127,7 +127,9 @@ def test_a_single_command_that_is_not_obeyed_is_reported(wire: Wire, run: Run) -
             code=1,
         )
 
-    assert reported().splitlines()[-1] == f"not obeyed: {teleop.source} drives"
+    assert (
+        reported().splitlines()[-1] == f"not obeyed: {teleop.source} drives; it has to stop first"
+    )
     teleop.close()
     assert reported().splitlines()[-1] == f"not obeyed: {teleop.source} drives{LEFT}"
 
@@ -163,7 +165,9 @@ def test_a_stop_that_is_refused_where_nothing_drives_is_no_failure(wire: Wire, r
     reported = once(
         wire, run, lambda source: CommandStatus(stopped=TELEOP, sources=[CommandSource(source)])
     )
-    assert reported.splitlines()[-1] == f"not obeyed: {TELEOP} has set the software stop"
+    assert reported.splitlines()[-1] == (
+        f"not obeyed: the robot is stopped by {TELEOP}; `holozen release` lets it drive again"
+    )
 
 
 def test_a_robot_that_is_gone_is_reported(
@@ -209,8 +213,8 @@ def test_a_stop_at_the_end_that_holds_another_source_is_reported(
     background(answer)
     _, _, err = run("topic", "pub", "cmd_vel", "{linear: {x: 0.2}}", "--times", "2")
     held = (
-        f"{teleop.source} is held now, as by any stop of an equal; `holozen controller "
+        f"this stop also holds {teleop.source}, which drove; `holozen controller "
         "--resume` lets it drive again"
     )
     drives = f"not obeyed: {teleop.source} drives"
-    assert err.splitlines()[1:] == ([drives, held] if stays else [drives + LEFT])
+    assert err.splitlines()[1:] == ([drives + STOP_FIRST, held] if stays else [drives + LEFT])

@@ -42,7 +42,7 @@ def test_no_source_outranks_a_person(arbiter: Arbiter) -> None:
     offer(arbiter, "teleop", PERSON, FORWARD, 1.0)
     assert (
         offer(arbiter, "hurry", PRIORITIES.index("REAL_TIME"), LEFT, 1.1)
-        == "overruled: teleop drives"
+        == "overruled: teleop drives; it has to stop first"
     )
     assert offer(arbiter, "hurry", PRIORITIES.index("REAL_TIME"), LEFT, 2.0) == ""
     assert offer(arbiter, "teleop", PERSON, STOP, 2.1) == ""
@@ -102,7 +102,9 @@ def test_a_higher_source_takes_the_robot_while_the_lower_one_drives(
     offer(arbiter, "low", low, FORWARD, 1.0)
     assert offer(arbiter, "high", high, LEFT, 1.1) == ""
     assert arbiter.motion(1.1).value == LEFT
-    assert offer(arbiter, "low", low, FORWARD, 1.2) == "overruled: high drives"
+    assert (
+        offer(arbiter, "low", low, FORWARD, 1.2) == "overruled: high drives; it has to stop first"
+    )
     assert arbiter.motion(1.2).value == LEFT
 
 
@@ -111,7 +113,9 @@ def test_among_equals_the_one_that_drives_goes_on_while_it_is_fresh(
     arbiter: Arbiter, rank: int
 ) -> None:
     offer(arbiter, "first", rank, FORWARD, 1.0)
-    assert offer(arbiter, "second", rank, LEFT, 1.1) == "overruled: first drives"
+    assert (
+        offer(arbiter, "second", rank, LEFT, 1.1) == "overruled: first drives; it has to stop first"
+    )
     assert arbiter.motion(1.1).value == FORWARD
     assert offer(arbiter, "second", rank, LEFT, 1.6).startswith("let go first: "), (
         "by silence, or by a stop"
@@ -130,8 +134,8 @@ def test_a_person_whom_another_overruled_drives_only_after_letting_go(arbiter: A
             reason = offer(arbiter, "second", PERSON, LEFT, tenth / 10 + 0.05)
         return reason
 
-    assert both(FORWARD, 10, 20) == "overruled: first drives"
-    assert both(STOP, 20, 30) == "overruled: first drives"
+    assert both(FORWARD, 10, 20) == "overruled: first drives; it has to stop first"
+    assert both(STOP, 20, 30) == "overruled: first drives; it has to stop first"
     refused = offer(arbiter, "second", PERSON, LEFT, 3.41)
     assert refused.startswith("let go first"), "a latched key does not drive once the robot is free"
     assert (
@@ -208,7 +212,7 @@ def test_an_equal_or_higher_source_may_stop_the_robot_and_it_stays_stopped(
 @pytest.mark.parametrize("low", [SCRIPT, CONTROLLER])
 def test_a_lower_source_may_not_even_stop_the_robot(arbiter: Arbiter, low: int) -> None:
     offer(arbiter, "teleop", PERSON, FORWARD, 1.0)
-    assert offer(arbiter, "low", low, STOP, 1.1) == "overruled: teleop drives"
+    assert offer(arbiter, "low", low, STOP, 1.1) == "overruled: teleop drives; it has to stop first"
     assert arbiter.motion(1.1).value == FORWARD
 
 
@@ -216,7 +220,10 @@ def test_a_held_source_stops_a_robot_whose_driver_has_been_silent() -> None:
     arbiter = Arbiter(timeout=2.0)
     offer(arbiter, "script", SCRIPT, FORWARD, 1.0)
     offer(arbiter, "teleop", PERSON, LEFT, 1.1)
-    assert offer(arbiter, "script", SCRIPT, STOP, 1.5) == "overruled: teleop drives"
+    assert (
+        offer(arbiter, "script", SCRIPT, STOP, 1.5)
+        == "overruled: teleop drives; it has to stop first"
+    )
     assert offer(arbiter, "script", SCRIPT, STOP, 1.7) == ""
     assert arbiter.motion(1.7).value == STOP
     assert offer(arbiter, "script", SCRIPT, FORWARD, 1.8) == HELD
@@ -229,7 +236,10 @@ def test_a_script_that_had_to_let_go_while_a_person_drove_waits_for_resume_besid
     offer(arbiter, "script", SCRIPT, FORWARD, 1.1)
     arbiter.release(1.2)
     offer(arbiter, "teleop", PERSON, LEFT, 1.3)
-    assert offer(arbiter, "script", SCRIPT, FORWARD, 1.4) == "overruled: teleop drives"
+    assert (
+        offer(arbiter, "script", SCRIPT, FORWARD, 1.4)
+        == "overruled: teleop drives; it has to stop first"
+    )
     offer(arbiter, "teleop", PERSON, STOP, 1.5)
     offer(arbiter, "script", SCRIPT, STOP, 2.1)
     assert offer(arbiter, "script", SCRIPT, FORWARD, 2.2) == HELD
@@ -306,7 +316,10 @@ def test_the_autopilot_itself_may_fall_silent_and_go_on(arbiter: Arbiter) -> Non
 
 def test_a_source_below_the_autopilot_neither_drives_nor_makes_it_yield(arbiter: Arbiter) -> None:
     offer(arbiter, "controller", CONTROLLER, FORWARD, 1.0)
-    assert offer(arbiter, "recorder", BACKGROUND, LEFT, 1.1) == "overruled: controller drives"
+    assert (
+        offer(arbiter, "recorder", BACKGROUND, LEFT, 1.1)
+        == "overruled: controller drives; it has to stop first"
+    )
     assert offer(arbiter, "recorder", BACKGROUND, LEFT, 9.0) == HELD
     assert not arbiter.held
 
@@ -323,7 +336,7 @@ def test_after_resume_a_held_source_drives_again(arbiter: Arbiter) -> None:
 
 def test_resume_is_refused_while_a_person_moves_the_robot(arbiter: Arbiter) -> None:
     offer(arbiter, "teleop", PERSON, FORWARD, 1.0)
-    assert arbiter.resume(1.1) == "teleop drives; stop first"
+    assert arbiter.resume(1.1) == "teleop drives; stop it first"
     assert arbiter.resumed == 0
     assert offer(arbiter, "controller", CONTROLLER, LEFT, 2.0) == HELD
     assert arbiter.resume(2.1) == ""
@@ -383,7 +396,10 @@ class TestWithoutATimeout:
 
     def test_a_second_teleop_can_drive_what_a_dead_one_left_driving(self, arbiter: Arbiter) -> None:
         offer(arbiter, "dead teleop", PERSON, FORWARD, 1.0)
-        assert offer(arbiter, "teleop", PERSON, LEFT, 1.4) == "overruled: dead teleop drives"
+        assert (
+            offer(arbiter, "teleop", PERSON, LEFT, 1.4)
+            == "overruled: dead teleop drives; it has to stop first"
+        )
         assert (
             offer(arbiter, "teleop", PERSON, STOP, 1.9)
             == offer(arbiter, "teleop", PERSON, LEFT, 2.0)
@@ -412,7 +428,10 @@ def test_a_flood_of_names_holds_its_own_rank_and_no_higher_one_and_frees_no_one(
 ) -> None:
     offer(arbiter, "teleop", PERSON, FORWARD, 1.0)
     for number in range(12 * MAX_NAMES):
-        assert offer(arbiter, f"forged {number}", rank, LEFT, 1.1) == "overruled: teleop drives"
+        assert (
+            offer(arbiter, f"forged {number}", rank, LEFT, 1.1)
+            == "overruled: teleop drives; it has to stop first"
+        )
     assert arbiter.motion(1.1).value == FORWARD
     for source in ("forged 0", f"forged {MAX_NAMES + 5}", "never heard of"):
         assert offer(arbiter, source, rank, LEFT, 9.0) == HELD
@@ -427,8 +446,14 @@ def test_a_name_that_is_forged_at_a_lower_rank_neither_holds_nor_replaces_its_ow
     arbiter: Arbiter,
 ) -> None:
     offer(arbiter, "teleop", PERSON, FORWARD, 1.0)
-    assert offer(arbiter, "teleop", BACKGROUND, LEFT, 1.1) == "overruled: teleop drives"
-    assert offer(arbiter, "teleop", BACKGROUND, STOP, 1.1) == "overruled: teleop drives"
+    assert (
+        offer(arbiter, "teleop", BACKGROUND, LEFT, 1.1)
+        == "overruled: teleop drives; it has to stop first"
+    )
+    assert (
+        offer(arbiter, "teleop", BACKGROUND, STOP, 1.1)
+        == "overruled: teleop drives; it has to stop first"
+    )
     assert arbiter.motion(1.1).value == FORWARD
     assert offer(arbiter, "teleop", PERSON, LEFT, 1.2) == ""
 
@@ -530,7 +555,10 @@ class TestLostOperator:
         """A name can be forged: what a loss does may only stop the robot."""
         offer(arbiter, "first", SCRIPT, FORWARD, 1.0)
         arbiter.forget("first")
-        assert offer(arbiter, "second", SCRIPT, LEFT, 1.1) == "overruled: first drives"
+        assert (
+            offer(arbiter, "second", SCRIPT, LEFT, 1.1)
+            == "overruled: first drives; it has to stop first"
+        )
         assert arbiter.motion(1.1).value == STOP
         assert offer(arbiter, "second", SCRIPT, LEFT, 1.6) == ""
 

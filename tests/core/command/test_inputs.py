@@ -144,12 +144,17 @@ def test_a_stamp_may_be_off_by_half_a_second_by_the_clock_it_is_nearest_to() -> 
         judge = Judge()
         judge.take(stamped(seconds))
         assert (judge.motion(), judge.reports) == ((1, 0, 0), []), seconds
-    for seconds, age in ((999.4, 0.6), (1000.6, -0.6), (7.0, -2.0)):
+    for seconds, age in (
+        (999.4, "0.6 s old"),
+        (1000.6, "0.6 s in the future"),
+        (7.0, "2.0 s in the future"),
+    ):
         judge = Judge()
         judge.take(stamped(seconds))
         assert judge.motion() == STOP
         assert judge.reports == [
-            f"Fred/cmd_vel: from me@1: stale: its stamp is {age} s old; at most {MAX_STAMP_AGE} s"
+            f"Fred/cmd_vel: from me@1: stale: its header.stamp is {age}, and the limit is "
+            f"{MAX_STAMP_AGE} s; set the clocks by NTP, or leave the stamp at 0"
         ]
         assert judge.twist_input.status(10.0).refused == {"stale": 1}
 
@@ -169,7 +174,8 @@ def test_a_command_that_may_have_waited_too_long_is_refused_but_a_stop_is_not(ju
     judge.take(Twist.planar(2), waited=0.6)
     assert judge.motion() == (1, 0, 0)
     assert judge.reports == [
-        "Fred/cmd_vel: from me@1: old: it waited up to 0.6 s for this process; at most 0.5 s"
+        "Fred/cmd_vel: from me@1: old: it may have waited 0.6 s for this busy process, and the "
+        "limit is 0.5 s; send it again"
     ]
     judge.take(Twist(), waited=math.inf)
     assert judge.motion() == STOP

@@ -9,8 +9,8 @@ RANK, PERSON = 4, 1
 GO = (0.3, 0.0, 0.0)
 STOPPED = "stopped: by ann@1; `holozen release` lets it drive again"
 LET_GO = (
-    "let go first: it commanded while another drove or the robot was stopped; send a stop or be "
-    "silent for 0.5 s"
+    "let go first: it commanded while another drove or the robot was stopped; let go of the keys, "
+    "or send zeros or nothing for 0.5 s, then drive"
 )
 
 
@@ -138,7 +138,7 @@ def test_a_slow_watchdog_means_an_equally_long_silence() -> None:
     robot = Robot(2.0)
     robot.go("slow", 2.0)
     robot.arbiter.release(2.0)
-    assert robot.go("slow", 3.5).endswith("silent for 2 s")
+    assert robot.go("slow", 3.5).endswith("or nothing for 2 s, then drive")
     assert robot.go("slow", 5.6) == ""
 
 
@@ -146,7 +146,7 @@ def test_where_the_watchdog_is_off_only_a_stop_counts() -> None:
     robot = Robot(None)
     robot.go("slow", 1.1)
     robot.arbiter.release(1.2)
-    assert robot.go("slow", 1000.0).endswith("send a stop")
+    assert robot.go("slow", 1000.0).endswith("or send zeros, then drive")
     assert robot.go("new", 1000.0) == ""
     assert robot.let_go("slow", 1001.0) == robot.go("slow", 1001.1) == ""
 
@@ -190,5 +190,5 @@ def test_with_a_longer_watchdog_a_source_has_to_be_silent_for_longer() -> None:
     robot.go("me", 1.1)
     robot.arbiter.set_timeout(2.0, 1.1)
     robot.arbiter.release(1.1)
-    assert "silent for 2 s" in robot.go("me", 3.0)
+    assert "nothing for 2 s" in robot.go("me", 3.0)
     assert robot.go("me", 5.1) == ""

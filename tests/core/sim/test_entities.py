@@ -694,7 +694,7 @@ def test_resume_is_refused_for_the_base_too_while_a_person_moves_a_joint(town: T
         return bool(replies)
 
     wait_for(answered)
-    assert replies[0].err and "person drives; stop first" in replies[0].err.payload.to_string()
+    assert replies[0].err and "person drives; stop it first" in replies[0].err.payload.to_string()
     assert (robot.commands.arbiters.base.held, robot.commands.arbiters.base.resumed) == (True, 0)
 
 
@@ -715,7 +715,7 @@ def test_a_stop_outlives_its_robot_and_a_thousand_others(
         "stopped: by ann@1; "
     )
     assert (
-        "sim: Fred is still stopped by ann@1; `holozen release` lets it drive again"
+        "sim: Fred is still stopped by ann@1; `holozen release Fred` lets it drive again"
         in capsys.readouterr().err
     )
 

@@ -237,7 +237,7 @@ def test_resume_is_a_service_between_the_steps(wire: Wire, ground: World) -> Non
         assert me.call("Fred/resume", TriggerRequest(), TriggerReply).success
         sim.arbiter.timeout = None
         sim.arbiter.offer("teleop@1", 1, FORWARD, time.monotonic())
-        with pytest.raises(ServiceError, match=r"^teleop@1 drives; stop first$"):
+        with pytest.raises(ServiceError, match=r"^teleop@1 drives; stop it first$"):
             me.call("Fred/resume", TriggerRequest(), TriggerReply)
     assert sim.arbiter.resumed == 1
 

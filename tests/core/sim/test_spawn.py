@@ -135,7 +135,7 @@ def test_a_second_sim_of_the_same_robot_is_refused(wire: Wire, bus: Bus, ground:
     ("robots", "expected"),
     [
         (["Fred", "Fred"], "2 robots are called 'Fred'; give each a name: --robot FILE=NAME"),
-        (["", "Ann", ""], "2 robots are called ''; give each a name: --robot FILE=NAME"),
+        (["", "Ann", ""], "2 robots have no name; give each a name: --robot FILE=NAME"),
     ],
 )
 def test_two_robots_of_one_name_are_refused(

@@ -387,9 +387,11 @@ def test_the_resume_key_asks_the_sim_and_shows_its_answer(
     press(session, "r")
     assert tick(session, lambda: session.warning) == "every source may drive"
     assert session.sent is None
-    resume.append("somebody drives; stop first")
+    resume.append("somebody drives; stop it first")
     press(session, "r")
-    assert tick(session, lambda: session.warning) == "not handed over: somebody drives; stop first"
+    assert (
+        tick(session, lambda: session.warning) == "not handed over: somebody drives; stop it first"
+    )
     press(session, "q")
     assert session.warning == ""
     assert robot.heard() == []

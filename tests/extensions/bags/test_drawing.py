@@ -78,6 +78,14 @@ def test_a_bag_without_odometry_is_reported(tmp_path: Path) -> None:
         draw(a_bag(tmp_path / "a.mcap", count=0), tmp_path / "a.png")
 
 
+def test_the_legends_say_what_each_line_is(tmp_path: Path) -> None:
+    bag = a_bag(tmp_path / "a.mcap")
+    draw(bag, tmp_path / "a.svg", paths={"odom": [(0, 0), (1, 0), (1, 1)]})
+    drawn = (tmp_path / "a.svg").read_text()
+    for label in ("odom: measured", "cmd_vel: commanded", "odom: wished path"):
+        assert f"<!-- {label} -->" in drawn
+
+
 SQUARE = "0 0 # x y, and theta as goals have it\n1, 0\n1 1 1.57\n0 1\n"
 
 

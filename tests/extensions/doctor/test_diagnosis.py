@@ -3,6 +3,8 @@
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -11,6 +13,7 @@ from holozen.doctor.diagnosis import (
     OK,
     WARNING,
     Peer,
+    ask_peers,
     clocks,
     commands,
     duplicates,
@@ -97,14 +100,15 @@ def test_nodes_of_other_versions_and_nodes_that_do_not_answer_are_named() -> Non
     assert (same.level, same.text) == (OK, "1 of this version: sim (pid 7 on there)")
 
 
-def test_a_node_that_is_open_to_the_network_is_a_warning() -> None:
+def test_a_node_that_listens_beyond_loopback_is_a_warning() -> None:
     payload = json.dumps(ABOUT | {"exposed": ["tcp/0.0.0.0:7447"]}).encode()
     exposed = read_peer("@holozen/abc/about", payload, 100.0, 100.2)
     assert exposed is not None
     (finding,) = open_ports([exposed, peer()])
     assert (finding.level, finding.check) == (WARNING, "network")
     assert finding.text.startswith(
-        "sim (pid 7 on there) listens at tcp/0.0.0.0:7447, open to the network: anyone"
+        "sim (pid 7 on there) listens at tcp/0.0.0.0:7447, and asks for no password or "
+        "certificate: whoever can reach it can drive"
     )
 
 
@@ -152,11 +156,35 @@ def test_what_keeps_a_robot_that_nothing_commands_is_reported() -> None:
         WARNING,
         "holozen controller Fred --resume, or r in the teleop",
     )
+    overruled = CommandSource("script@1", "DATA", held=True)
+    (finding,) = commands("cmd_vel", CommandStatus(held=True, sources=[overruled]))
+    assert finding.level == WARNING
     (finding,) = commands("cmd_vel", CommandStatus(), ["teleop", "controller"])
     assert (
         "now; controller, teleop could; if the controller is held: holozen controller --resume"
         in finding.text
     )
+
+
+def test_a_node_whose_tokens_are_known_before_it_can_answer_is_asked_again() -> None:
+    class NewLink:
+        """Its nodes can answer from the fifth query on."""
+
+        queries = 0
+
+        def ask_all(self, _key: str, _timeout: float) -> list[SimpleNamespace]:
+            self.queries += 1
+            reply = SimpleNamespace(key="@holozen/abc/about", payload=json.dumps(ABOUT).encode())
+            return [reply] if self.queries >= 5 else []
+
+    bus: Any = NewLink()
+    assert ask_peers(bus, ["abc"]).keys() == {"abc"}
+
+
+def test_a_teleop_that_has_ended_and_a_robot_without_a_controller_are_no_warning() -> None:
+    (finding,) = commands("cmd_vel", CommandStatus(held=True))
+    assert (finding.level, finding.fix) == (OK, "")
+    assert "a controller after holozen controller --resume" in finding.text
 
 
 def test_a_stopped_robot_is_reported_with_what_releases_it() -> None:

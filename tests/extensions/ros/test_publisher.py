@@ -120,7 +120,7 @@ def test_a_robot_that_does_not_obey_is_logged_with_the_reason_once(
 
     assert (
         reports(CommandStatus("ann@1", sources=[CommandSource(me)]), Twist())
-        == "/cmd_vel: not obeyed: ann@1 drives"
+        == "/cmd_vel: not obeyed: ann@1 drives; it has to stop first"
     )
     assert reports(CommandStatus(me), Twist()) == "/cmd_vel: obeyed again"
     held = reports(CommandStatus(sources=[CommandSource(me, held=True)]), Twist())
@@ -135,7 +135,7 @@ def test_a_robot_that_does_not_obey_is_logged_with_the_reason_once(
         node.create_publisher(Wrench, f"{wheel}_wheel_force", 1) for wheel in ("left", "rear")
     )
     refused = reports(CommandStatus("ann@1", sources=[CommandSource(me)]), Wrench())
-    assert refused == "/left_wheel_force: not obeyed: ann@1 drives"
+    assert refused == "/left_wheel_force: not obeyed: ann@1 drives; it has to stop first"
     second.publish(Wrench())
     assert not capfd.readouterr().err, "the first of a robot's forces reports for all of them"
     assert not [end for end in sim.endpoints() if end.kind == "sub" and end.key == "cmd_vel_status"]

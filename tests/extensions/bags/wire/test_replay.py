@@ -169,7 +169,10 @@ def test_commands_that_a_robot_does_not_obey_are_reported(
     done = verb(town, "replay", path, "--commands")
     assert verb(town, "release").returncode == 0
     assert done.returncode == 1
-    assert re.fullmatch(r"not obeyed: stop@\w+ has set the software stop\n", done.stderr)
+    assert re.fullmatch(
+        r"not obeyed: the robot is stopped by stop@\w+; `holozen release` lets it drive again\n",
+        done.stderr,
+    )
 
 
 def test_a_robot_that_comes_while_it_plays_is_not_moved(

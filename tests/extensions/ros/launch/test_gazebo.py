@@ -48,13 +48,18 @@ def publisher(robot: Any, **more: Any) -> Node:
     )
 
 
-def test_gazebos_launch_files_start_the_sim(follow: Follow) -> None:
+def test_gazebos_launch_files_start_the_sim(
+    follow: Follow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("here.world", "my.sdf"):
+        Path(name).touch()
     for package, name, arguments, world in [
         ("gazebo_ros", "gazebo.launch.py", {}, EMPTY),
         ("gazebo_ros", "gazebo.launch.py", {"world": "", "gui": "false"}, EMPTY),
         ("gazebo_ros", "gzserver.launch.py", {"world": "worlds/empty.world"}, EMPTY),
         ("gazebo_ros", "gazebo.launch.py", {"world": "arena.world"}, ARENA),
-        ("gazebo_ros", "gazebo.launch.py", {"world": "nowhere.world"}, "nowhere.world"),
+        ("gazebo_ros", "gazebo.launch.py", {"world": "here.world"}, "here.world"),
         ("ros_gz_sim", "gz_sim.launch.py", {"gz_args": "-r -v 4 empty.sdf"}, EMPTY),
         ("ros_gz_sim", "gz_sim.launch.py", {"gz_args": "-r my.sdf -v4"}, "my.sdf"),
         ("ros_gz_sim", "gz_sim.launch.py", {"gz_args": ""}, EMPTY),
@@ -63,6 +68,12 @@ def test_gazebos_launch_files_start_the_sim(follow: Follow) -> None:
         kept = follow([included(package, name, **arguments)])
         assert kept.words() == ["sim", "--empty", "--world", world]
         assert kept.programs[0].required
+
+
+def test_a_world_that_is_not_there_is_an_error_before_anything_starts(follow: Follow) -> None:
+    launched = included("gazebo_ros", "gazebo.launch.py", world="aren.world")
+    with pytest.raises(LaunchError, match=r"'aren.world': there is no such file .*arena.world"):
+        follow([ExecuteProcess(cmd=["true"]), launched])
 
 
 def test_a_world_of_the_package_is_used_as_it_is(follow: Follow, write: Write) -> None:
@@ -87,7 +98,11 @@ def test_server_and_window_are_one_sim(follow: Follow, capsys: pytest.CaptureFix
     assert len(both.programs) == 1
 
 
-def test_gazebo_as_a_program_is_the_sim(follow: Follow) -> None:
+def test_gazebo_as_a_program_is_the_sim(
+    follow: Follow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("my.world").touch()
     for command, world in [
         (["gazebo", "--verbose", "-s", "libgazebo_ros_factory.so", "arena.world"], ARENA),
         (["gzserver", "-s", "libgazebo_ros_init.so"], EMPTY),

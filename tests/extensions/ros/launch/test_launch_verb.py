@@ -368,6 +368,26 @@ def test_a_signal_ends_the_nodes_and_the_launch(
         assert "Traceback" not in process.err.replace("[controller.py-1] Traceback", "")
 
 
+def test_a_part_that_ends_by_ctrl_c_shows_no_traceback_but_that_of_its_own_fault(
+    wire: Wire, write: Write, my_bot: Path
+) -> None:
+    sleeps = "print('sleeps', flush=True); import time; time.sleep(100)"
+    write("plain.py", sleeps)
+    write("faulty.py", f"try:\n    {sleeps}\nfinally:\n    int('x')\n")
+    parts = [
+        f"ExecuteProcess(cmd=['sh', '-c', 'exec python3 {one}.py'])" for one in ("plain", "faulty")
+    ]
+    write("a.launch.py", described(*parts))
+    with Process(line(wire, "a.launch.py"), env=environment()) as process:
+        process.wait_for_line("[sh-1] sleeps")
+        process.wait_for_line("[sh-2] sleeps")
+        assert process.interrupt() == 0
+        assert "[sh-1] " not in process.err
+        assert process.err.endswith(
+            "[sh-2] ValueError: invalid literal for int() with base 10: 'x'\n"
+        )
+
+
 def test_a_signal_ends_it_even_if_its_output_is_not_read(
     wire: Wire, write: Write, my_bot: Path
 ) -> None:
