@@ -44,8 +44,8 @@ class Driver:
     def __init__(self, bus: Bus, command: str, odometry: str) -> None:
         self.namespace = command.rpartition("/")[0]
         self._bus, self.command = bus, command
-        self.odom = RobotFeedback(bus, odometry)
         self._status = bus.latest(f"{command}_status", CommandStatus)
+        self.odom = RobotFeedback(bus, odometry, self._status)
         self._beats = bus.echoes(command)
         self._helm, self._lock = Helm(), threading.Lock()
         self._echo = b""  # the beats that the last page that drove had heard

@@ -50,10 +50,10 @@ class RobotClient:
         assert self._commands.echoes
         self._echoes = self._commands.echoes
         self._echoes.settle(0.0)  # a key waits for no beat
-        self.odom = RobotFeedback(bus, self.beside("odom"))
         self.status_key = f"{self.key}_status"
         self.name = ""  # in the sim; empty while it is not known
         self._status = bus.latest(self.status_key, CommandStatus)
+        self.odom = RobotFeedback(bus, self.beside("odom"), self._status)
 
     def beside(self, name: str) -> str:
         """The robot's key with this name, beside its command key."""
