@@ -7,14 +7,13 @@ from typing import Any
 
 from holozen import wire
 from holozen.bus import Latest
-from holozen.command.outcome import Outcome
+from holozen.command.outcome import OVER_LIMITS, Outcome
 from holozen.console import report as report_line
 
 FRESH = 1.0  # s; after that a robot whose status came is gone
 COVERED = 3  # statuses after a command, of which the last was sent after the command has been read
 EVERY = 0.1  # s between two looks in a pause
 HOLDING = 0.3  # s within which a status tells who is held after a stop; it comes at 10 Hz
-LIMITED = "over the limits"  # prefix of the sim's reason when it drives slower than commanded
 # prefixes of its reasons for commands that took too long
 LATE = (Outcome.HELD_UP.value, Outcome.OLD.value)
 OVERRULED = "overruled"  # prefix of its reason when a higher source drives
@@ -27,24 +26,30 @@ HOLDS = "{driver} is held now, as by any stop of an equal; `{command}` lets it d
 
 
 def verdict(status: Any, source: str) -> str | None:
-    """Why the robot does not follow the commands of `source`, by a CommandStatus; empty if it does.
-    None if the sim has not received any yet: a status sent before the command arrived does not
-    cover it.
+    """Why the robot does not follow the commands of `source`, or follows them within its limits
+    alone (OVER_LIMITS), by a CommandStatus; empty if it follows them. None if the sim has not
+    received any yet: a status sent before the command arrived does not cover it.
     """
     mine = next((each for each in status.sources if each.source == source), None)
-    own_refusal = status.last_refusal.removeprefix(f"{source}: ")
-    if own_refusal == status.last_refusal:
-        own_refusal = ""
+    own_refusal = _own(status.last_refusal, source)
     if status.stopped:
         return f"{status.stopped} has set the software stop"
     if status.obeyed == source or (mine and mine.obeyed):
-        return own_refusal if own_refusal.startswith(LIMITED) else ""
+        return _own(status.last_clamped, source)
     kind = own_refusal.partition(":")[0]
     if kind == "held" or (mine and mine.held and kind == ""):
         return HELD
     if mine and status.obeyed and kind in ("", OVERRULED):
         return f"{status.obeyed}{DRIVES}"
     return own_refusal or None
+
+
+def _own(report: str, source: str) -> str:
+    """The reason in a status's report of a refused or clamped command; empty if that is of another
+    source.
+    """
+    whose, _, reason = report.partition(": ")
+    return reason if whose == source else ""
 
 
 def verdict_on_part(status: Any, before: Any, source: str) -> str | None:
@@ -128,7 +133,7 @@ class CommandFeedback:
         is_late = why.startswith(LATE)
         # each names another age
         if why != self._reported and not (is_late and self._reported.startswith(LATE)):
-            if why and not why.startswith(LIMITED):
+            if why and not why.startswith(OVER_LIMITS):
                 resume = RESUME.format(command=self._resume) if why == HELD else ""
                 self._tell(f"not obeyed: {why}{resume}", None if is_late else self._driver)
             else:
@@ -140,7 +145,7 @@ class CommandFeedback:
         ):
             self._report(ONLY_TURNS)
             self._has_noted = True
-        self._reported, self.refusal = why, "" if why.startswith(LIMITED) else why
+        self._reported, self.refusal = why, "" if why.startswith(OVER_LIMITS) else why
         return True
 
     def wait(self, stop: threading.Event, seconds: float, after: int = -1) -> None:

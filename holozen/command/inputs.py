@@ -20,7 +20,7 @@ from holozen.command.motion import (
     is_stop,
     motion_of,
 )
-from holozen.command.outcome import Decision
+from holozen.command.outcome import OVER_LIMITS, Decision
 from holozen.command.wait_set import Moment, Reader
 from holozen.console import report
 from holozen.limits import STOP, Planar, clamp_speed
@@ -51,6 +51,7 @@ MARK = 0.1  # s between two samples of a count
 REPORT_EVERY = 1.0  # s
 # a second by all robots: if a fleet's driver fails, each of them has something to report
 MAX_LINES = 10
+MAX_REASON = 300  # characters: a sender's name may be long
 M = TypeVar("M", bound=Message)
 
 PARTIAL_STOP = "part: partial stop: this source still moves another joint or topic"
@@ -262,7 +263,9 @@ class TwistInput(Input[Twist | TwistStamped]):
             resumed=self.arbiter.resumed,
             accepted=self.stats.accepted,
             refused=dict(self.stats.refused),
-            last_refusal=self.stats.last,
+            last_refusal=self.stats.last_refusal,
+            clamped=self.stats.clamped,
+            last_clamped=self.stats.last_clamped,
             stopped=self.arbiter.stopped_by or "",
             sources=[
                 CommandSource(
@@ -286,10 +289,10 @@ class TwistInput(Input[Twist | TwistStamped]):
             and limited != velocity
         ):
             text = (
-                f"over the limits of {self.linear:g} m/s and {self.angular:g} rad/s, clamped: "
+                f"{OVER_LIMITS} of {self.linear:g} m/s and {self.angular:g} rad/s, clamped: "
                 f"{velocity}"
             )
-            self._refuse(command, text, "clamped")
+            self.stats.note_clamped(self.keys[0], text, command.source, command.moment.now)
 
     def _reported(self, command: Command[Twist | TwistStamped]) -> str:
         return self.keys[0]
@@ -455,15 +458,23 @@ class ReportLimit:
 
 
 class CommandStats:
-    """Counts accepted commands, and refused ones by kind. `last` is the last refusal."""
+    """Counts the commands of one robot, and reports what it does not do as commanded.
+
+    Attributes:
+        accepted: The number of those that were accepted.
+        clamped: The number of those of them that were over the limits.
+        refused: The numbers of refused ones by kind.
+        last_clamped: The source of the last that was clamped, and why; empty if there was none.
+        last_refusal: The same of the last that was refused.
+    """
 
     def __init__(
         self, report: Callable[[str], None] = report, limit: ReportLimit | None = None
     ) -> None:
         self._limit = limit or ReportLimit()
-        self.accepted = 0
+        self.accepted = self.clamped = 0
         self.refused: Counter[str] = Counter()
-        self.last = ""
+        self.last_clamped = self.last_refusal = ""
         self._report = report
         self._reported = -math.inf
         self._unreported = 0
@@ -480,12 +491,21 @@ class CommandStats:
     def refuse(self, key: str, kind: str, reason: str, source: str, now: float) -> None:
         """Count and report a refused command of `source` on `key`."""
         self.refused[kind] += 1
-        self.last = f"{source}: {reason}"[:300]
+        self.last_refusal = f"{source}: {reason}"[:MAX_REASON]
+        self._report_some(key, self.last_refusal, now)
+
+    def note_clamped(self, key: str, reason: str, source: str, now: float) -> None:
+        """Count and report a command of `source` on `key` that was obeyed within the limits."""
+        self.clamped += 1
+        self.last_clamped = f"{source}: {reason}"[:MAX_REASON]
+        self._report_some(key, self.last_clamped, now)
+
+    def _report_some(self, key: str, what: str, now: float) -> None:
         self._unreported += 1
         if now - self._reported < REPORT_EVERY or not self._limit.take(now):
             return
         more = f" (and {self._unreported - 1} more)" if self._unreported > 1 else ""
-        self._report(f"{key}: from {self.last}{more}")
+        self._report(f"{key}: from {what}{more}")
         self._reported, self._unreported = now, 0
 
 

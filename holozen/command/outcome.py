@@ -5,6 +5,8 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
+OVER_LIMITS = "over the limits"  # begins the reason why a command was clamped, which is obeyed
+
 
 class Outcome(Enum):
     """What becomes of a command. The value of a refusal is the word under which it is counted and
