@@ -32,6 +32,12 @@ from holozen.wire import COMMAND_SILENCE, resume_command
 PERSON = PRIORITIES.index("INTERACTIVE_HIGH")
 # from here down, a source waits for `resume` once a higher one has driven
 AUTOPILOT = PRIORITIES.index("DATA_LOW")
+# s; so long the driver's last command keeps lower ranks off, and motions of equals
+KEEPS_OFF = COMMAND_SILENCE
+# s of silence that let go, unless a robot's velocities count for longer
+LETS_GO = COMMAND_SILENCE
+# s; so long a topic or joint that a source set moving counts as moved by it
+PART_MOVES = COMMAND_SILENCE
 MAX_NAMES = 100  # sources of a rank with a record of their own: names come over the wire
 MAX_PARTS = 100  # sources whose moving topics or joints are known
 LET_GO = "it commanded while another drove or the robot was stopped; send a stop{or_wait}"
@@ -210,11 +216,12 @@ class State(Struct):
 class Arbiter:
     """Chooses which source drives one robot, by the five rules above.
 
-    A source stops driving after `timeout` seconds of silence; with None, it drives until another
-    one commands. Silence is measured on the clock `time`; all methods take real times in s. Reasons
-    name the `robot`.
+    A source that drives joints, or by forces, stops driving after COMMAND_SILENCE. Silence is
+    measured on the clock `time`; all methods take real times in s. Reasons name the `robot`.
 
     Attributes:
+        velocity_timeout: The silence in s after which a source that drives by velocities stops
+            driving; None: it drives until another one commands.
         state: What its decisions depend on.
         resumed: How often `resume` succeeded.
         stopped_at: The last time (s) at which the software stop was set, or set again; None before.
@@ -223,11 +230,14 @@ class Arbiter:
     """
 
     def __init__(
-        self, timeout: float | None, time: CommandTime | None = None, robot: str = ""
+        self,
+        velocity_timeout: float | None = COMMAND_SILENCE,
+        time: CommandTime | None = None,
+        robot: str = "",
     ) -> None:
         self._robot = robot
         self.time = time or CommandTime()
-        self.timeout = timeout
+        self.velocity_timeout = velocity_timeout
         self.parts = Parts()
         self.state = State()
         self.resumed = 0
@@ -453,12 +463,12 @@ class Arbiter:
         self.state.began = now
         self._drive(None)
 
-    def set_timeout(self, timeout: float | None, now: float) -> None:
-        """Set the `timeout` in s from `now` on. A longer one does not revive a source that has
-        fallen silent.
+    def set_velocity_timeout(self, timeout: float | None, now: float) -> None:
+        """Set the `velocity_timeout` in s from `now` on. A longer one does not revive a source that
+        has fallen silent.
         """
         self._drive(self.driver(now))
-        self.timeout = timeout
+        self.velocity_timeout = timeout
 
     def settle(self, now: float) -> None:
         """The robot is removed at `now`: who has been silent until then has let go. Another one may
@@ -494,16 +504,15 @@ class Arbiter:
 
     def _patience(self, driver: Driver) -> float | None:
         """The silence in s after which a driver no longer drives; None: never."""
-        if not isinstance(driver.motion, tuple):
-            return COMMAND_SILENCE
-        return self.timeout
+        is_velocity = isinstance(driver.motion, tuple)
+        return self.velocity_timeout if is_velocity else COMMAND_SILENCE
 
     def _is_overruled(self, case: Case) -> bool:
         """Whether another source with a fresh command keeps this one off: one above it, and of
         motions an equal.
         """
         other = case.other
-        if other is None or self.time.at(case.now) - other.sent > COMMAND_SILENCE:
+        if other is None or self.time.at(case.now) - other.sent > KEEPS_OFF:
             return False
         if is_stop(case.motion):
             return case.source.rank > other.source.rank
@@ -549,7 +558,7 @@ class Arbiter:
 
     def _silence_limit(self) -> float | None:
         """The silence in s that lets go; None if only a stop does."""
-        return None if self.timeout is None else max(self.timeout, COMMAND_SILENCE)
+        return None if self.velocity_timeout is None else max(self.velocity_timeout, LETS_GO)
 
     def _on_clock(self, sent: float, now: float) -> float:
         """A real time on the clock of commands; while the sim is paused, commands do not age."""
@@ -580,8 +589,8 @@ class Arbiter:
 
 
 class Parts:
-    """The topics or joints that each source has set moving in the last 0.5 s, and not stopped
-    since.
+    """The topics or joints that each source has set moving in the last PART_MOVES seconds, and not
+    stopped since.
 
     A source may command them one by one: then a zero for one is no stop while it moves another.
     Names come over the wire, so of too many sources the one that has been silent for the longest
@@ -596,9 +605,7 @@ class Parts:
         its source still moves any.
         """
         mine = {
-            name: at
-            for name, at in self._moving.pop(source, {}).items()
-            if time - at <= COMMAND_SILENCE
+            name: at for name, at in self._moving.pop(source, {}).items() if time - at <= PART_MOVES
         }
         for name, moves in parts:
             mine.pop(name, None)
@@ -611,10 +618,10 @@ class Parts:
         return bool(mine)
 
     def settle(self, time: float) -> None:
-        """Forget what no source has moved for 0.5 s by `time` (s)."""
+        """Forget what no source has moved for PART_MOVES by `time` (s)."""
         for source, parts in self._moving.items():
             self._moving[source] = {
-                name: at for name, at in parts.items() if time - at <= COMMAND_SILENCE
+                name: at for name, at in parts.items() if time - at <= PART_MOVES
             }
 
     def inherit(self, other: Parts, time: float) -> None:

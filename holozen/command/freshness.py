@@ -17,7 +17,7 @@ from holozen.command.outcome import Decision, Outcome, refusal
 from holozen.messages import Message
 from holozen.transport.pubsub import Received
 from holozen.transport.samples import Echo, Stamp
-from holozen.wire import COMMAND_SILENCE
+from holozen.wire import MAX_COMMAND_AGE
 
 M = TypeVar("M", bound=Message)
 K = TypeVar("K", bound=Hashable)
@@ -27,7 +27,8 @@ T = TypeVar("T")
 BEGIN_AGE = 0.15
 # streams or speakers; beyond, the one that has not commanded for the longest time is forgotten
 MAX_KNOWN = 256
-AGES = (0.05, COMMAND_SILENCE)  # s; the range of `max_age`
+AGES = (0.05, MAX_COMMAND_AGE)  # s; the range of `max_age`
+PAUSE = 0.5  # s between two late commands, after which the second one is the first of others
 
 OLD = "it was sent up to {age:.2f} s ago; at most {limit:g} s"
 WAITED = "it waited up to {age:.1f} s for this process; at most {limit:g} s"
@@ -152,7 +153,7 @@ class Freshness(Generic[M]):
         self._senders = senders
         self._arbiters = tuple(arbiters)
         self.stops = stops
-        self.max_age = COMMAND_SILENCE
+        self.max_age = MAX_COMMAND_AGE
         self._newest: OrderedDict[Stream, Position] = OrderedDict()
         self._heard: OrderedDict[Speaker, Heard] = OrderedDict()
         self._held_up: OrderedDict[Stream, Late] = OrderedDict()
@@ -248,7 +249,7 @@ class Freshness(Generic[M]):
         a pause since.
         """
         before = self._held_up.get(stream)
-        first = before.first if before and now - before.last <= COMMAND_SILENCE else now
+        first = before.first if before and now - before.last <= PAUSE else now
         _put(self._held_up, stream, Late(first, now))
         return first
 

@@ -138,14 +138,14 @@ class Settings:
             )
         return value
 
-    def timeout(self, *names: str) -> float:
-        """Seconds, or -1 for a disabled watchdog. Raises RobotError."""
+    def timeout(self, *names: str) -> float | None:
+        """Seconds; None for a watchdog that is disabled, by a negative number. Raises
+        RobotError.
+        """
         value = number(self.word(*names))
-        return (
-            -1.0
-            if value is not None and value < 0
-            else self.number(COMMAND_SILENCE, *names, zero=False)
-        )
+        if value is not None and value < 0:
+            return None
+        return self.number(COMMAND_SILENCE, *names, zero=False)
 
     def flag(self, *names: str, default: bool = True) -> bool:
         """True, false, 1 or 0; `default` if not set. Raises RobotError."""
@@ -952,9 +952,10 @@ def _warn_not_run(plugin: Tag, kind: str, source: Source) -> None:
 
 
 def _warn_of_timeout(drive: Drive, settings: Settings, source: Source) -> None:
-    if not 0 < drive.command_timeout <= LONG_TIMEOUT:
+    timeout = drive.command_timeout
+    if timeout is None or timeout > LONG_TIMEOUT:
         tag = settings.tag("cmd_timeout", "command_timeout")
-        long = "for ever" if drive.command_timeout < 0 else f"for {drive.command_timeout:g} s"
+        long = "for ever" if timeout is None else f"for {timeout:g} s"
         problem = (
             f"is {cut(tag.value())}: a robot whose driver hangs, or whose link is cut, "
             f"drives on {long}"

@@ -19,7 +19,7 @@ PERSON, SCRIPT, CONTROLLER, BACKGROUND = (
 
 @pytest.fixture
 def arbiter() -> Arbiter:
-    return Arbiter(timeout=0.5)
+    return Arbiter(velocity_timeout=0.5)
 
 
 def offer(
@@ -62,7 +62,7 @@ def test_a_command_is_obeyed_at_once(arbiter: Arbiter) -> None:
 
 def test_a_longer_watchdog_does_not_wake_a_command_that_was_over(arbiter: Arbiter) -> None:
     offer(arbiter, "script", SCRIPT, FORWARD, 1.0)
-    arbiter.set_timeout(2.0, now=1.6)
+    arbiter.set_velocity_timeout(2.0, now=1.6)
     assert (arbiter.motion(1.6).value, arbiter.driver(1.6)) == (STOP, None)
     offer(arbiter, "script", SCRIPT, FORWARD, 2.0)
     assert (arbiter.motion(3.9).value, arbiter.motion(4.1).value) == (FORWARD, STOP)
@@ -70,7 +70,7 @@ def test_a_longer_watchdog_does_not_wake_a_command_that_was_over(arbiter: Arbite
 
 def test_a_shorter_watchdog_stops_a_robot_without_fresh_commands(arbiter: Arbiter) -> None:
     offer(arbiter, "script", SCRIPT, FORWARD, 1.0)
-    arbiter.set_timeout(0.1, now=1.05)
+    arbiter.set_velocity_timeout(0.1, now=1.05)
     assert (arbiter.motion(1.09).value, arbiter.motion(1.11).value) == (FORWARD, STOP)
 
 
@@ -213,7 +213,7 @@ def test_a_lower_source_may_not_even_stop_the_robot(arbiter: Arbiter, low: int) 
 
 
 def test_a_held_source_stops_a_robot_whose_driver_has_been_silent() -> None:
-    arbiter = Arbiter(timeout=2.0)
+    arbiter = Arbiter(velocity_timeout=2.0)
     offer(arbiter, "script", SCRIPT, FORWARD, 1.0)
     offer(arbiter, "teleop", PERSON, LEFT, 1.1)
     assert offer(arbiter, "script", SCRIPT, STOP, 1.5) == "overruled: teleop drives"
@@ -276,7 +276,7 @@ def test_a_script_that_spoke_while_a_person_drove_is_held_too(arbiter: Arbiter) 
 
 
 def test_what_lets_a_held_source_drive_again_names_the_robot() -> None:
-    arbiter = Arbiter(timeout=0.5, robot="Fred")
+    arbiter = Arbiter(velocity_timeout=0.5, robot="Fred")
     offer(arbiter, "teleop", PERSON, LEFT, 1.0)
     reason = offer(arbiter, "controller", CONTROLLER, FORWARD, 9.0)
     assert reason == HELD.replace("controller", "controller Fred")
@@ -346,7 +346,7 @@ def test_it_knows_when_a_source_last_made_others_wait(arbiter: Arbiter) -> None:
     arbiter.stop("person", 2.0)
     arbiter.stop("person", 3.0)
     assert arbiter.taken_at == arbiter.stopped_at == 3.0, "a stop is set, and set again"
-    other = Arbiter(timeout=0.5)
+    other = Arbiter(velocity_timeout=0.5)
     other.inherit(arbiter, 4.0)
     assert other.taken_at == other.stopped_at == 3.0
 
@@ -359,7 +359,7 @@ def test_resume_leaves_an_autopilot_that_drives_at_the_wheel(arbiter: Arbiter) -
 
 
 def test_a_timeout_of_zero_obeys_for_one_moment(arbiter: Arbiter) -> None:
-    arbiter = Arbiter(timeout=0)
+    arbiter = Arbiter(velocity_timeout=0)
     offer(arbiter, "teleop", PERSON, FORWARD, 1.0)
     assert arbiter.motion(1.0).value == FORWARD
     assert arbiter.motion(1.0 + 1e-9).value == STOP
@@ -370,7 +370,7 @@ class TestWithoutATimeout:
 
     @pytest.fixture
     def arbiter(self) -> Arbiter:
-        return Arbiter(timeout=None)
+        return Arbiter(velocity_timeout=None)
 
     def test_a_silent_source_is_obeyed_for_ever(self, arbiter: Arbiter) -> None:
         offer(arbiter, "teleop", PERSON, FORWARD, 1.0)
