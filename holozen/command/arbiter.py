@@ -200,8 +200,8 @@ class State(Struct):
         records: By rank.
         highest: The highest rank that has driven since the last resume.
         stopped_by: Who set the software stop; None while it is not set.
-        released: When that was released last (s): commands sent before were sent to a stopped
-            robot.
+        released: When that was released last (s), if ever: commands sent before were sent to a
+            stopped robot.
         began: The last play, reset or spawn (s): commands sent before move nothing.
     """
 
@@ -209,8 +209,12 @@ class State(Struct):
     records: dict[int, Records] = field(default_factory=dict)
     highest: int = AUTOPILOT + 1
     stopped_by: str | None = None
-    released: float = 0.0
+    released: float | None = None
     began: float = 0.0
+
+    def was_released_after(self, time: float) -> bool:
+        """Whether a software stop ended after `time` (s)."""
+        return self.released is not None and time < self.released
 
 
 class Arbiter:
@@ -372,7 +376,7 @@ class Arbiter:
         source, driver = _source(name, rank), self.driver(now)
         # Of a refused one the earliest time counts: it moves nothing, and its source may not have
         # let go.
-        was_stopped = sent is not None and min(sent.at, sent.unheard) < self.state.released
+        was_stopped = sent is not None and self.state.was_released_after(min(sent.at, sent.unheard))
         has_commanded = was_stopped or self._record(source, driver).commanded is not None
         self._note_motion(source, driver, now, has_commanded)
 
@@ -544,7 +548,7 @@ class Arbiter:
         not been silent since it commanded in vain.
         """
         sent = case.sent
-        if sent.unheard < self.state.released:
+        if self.state.was_released_after(sent.unheard):
             return True
         commanded = self._record(case.source, case.driver).commanded
         if commanded is None:

@@ -148,7 +148,7 @@ class CommandFeedback:
         self._reported, self.refusal = why, "" if why.startswith(OVER_LIMITS) else why
         return True
 
-    def wait(self, stop: threading.Event, seconds: float, after: int = -1) -> None:
+    def wait(self, stop: threading.Event, seconds: float, after: int = 0) -> None:
         """Wait until the sim has judged the commands, by more than `after` statuses; report if it
         has not after so many `seconds`.
         """

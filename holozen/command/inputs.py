@@ -4,7 +4,6 @@ to the arbiters.
 
 from __future__ import annotations
 
-import math
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -447,11 +446,12 @@ class ReportLimit:
     """
 
     def __init__(self) -> None:
-        self._since, self._written = -math.inf, 0
+        self._since: float | None = None  # s; when the second began; None before the first report
+        self._written = 0
 
     def take(self, now: float) -> bool:
         """Whether another report may be written at `now` (s)."""
-        if not 0 <= now - self._since < REPORT_EVERY:
+        if self._since is None or not 0 <= now - self._since < REPORT_EVERY:
             self._since, self._written = now, 0
         self._written += 1
         return self._written <= MAX_LINES
@@ -476,7 +476,7 @@ class CommandStats:
         self.refused: Counter[str] = Counter()
         self.last_clamped = self.last_refusal = ""
         self._report = report
-        self._reported = -math.inf
+        self._reported_at: float | None = None  # s; None: nothing was
         self._unreported = 0
 
     def validated(self, received: Received[M], keys: tuple[str, ...], now: float) -> M | None:
@@ -502,11 +502,12 @@ class CommandStats:
 
     def _report_some(self, key: str, what: str, now: float) -> None:
         self._unreported += 1
-        if now - self._reported < REPORT_EVERY or not self._limit.take(now):
+        is_soon = self._reported_at is not None and now - self._reported_at < REPORT_EVERY
+        if is_soon or not self._limit.take(now):
             return
         more = f" (and {self._unreported - 1} more)" if self._unreported > 1 else ""
         self._report(f"{key}: from {what}{more}")
-        self._reported, self._unreported = now, 0
+        self._reported_at, self._unreported = now, 0
 
 
 def _fault(received: Received[M], keys: tuple[str, ...]) -> tuple[str, str]:

@@ -257,7 +257,7 @@ class Echoes(Declared):
         self.was_heard = False  # whether any was heard when the last command was sent
         self._turn = 0  # of `hearing`, when it was last looked at
         self._is_settled = False
-        self._waits_since = 0.0  # s, monotonic; 0: it does not wait
+        self._waits_since: float | None = None  # s, monotonic; None: it does not wait
         self._has_reported = False
 
     def attached(self, waited: float = 0.0) -> bytes:
@@ -335,10 +335,11 @@ class Echoes(Declared):
         """
         self.settle()
         if not (receivers := self.awaited):
-            self._waits_since, self._has_reported = 0.0, False
+            self._waits_since, self._has_reported = None, False
             return True
         now = time.monotonic()
-        self._waits_since = self._waits_since or now
+        if self._waits_since is None:
+            self._waits_since = now
         if not self._has_reported and now - self._waits_since > NOTICE:
             self._has_reported = True
             report(WAITING.format(key=self.key, receivers=receivers))
