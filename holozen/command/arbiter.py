@@ -23,7 +23,7 @@ from msgspec.structs import replace
 
 from holozen.command.command_time import ROUNDING, CommandTime
 from holozen.command.motion import AppliedForce, AppliedForces, Motion, is_stop
-from holozen.command.outcome import Decision, Outcome, refusal
+from holozen.command.outcome import UNKNOWN_CALLER, Decision, Outcome, refusal
 from holozen.limits import STOP
 from holozen.transport.samples import PRIORITIES
 from holozen.wire import COMMAND_SILENCE, resume_command
@@ -44,7 +44,6 @@ LET_GO = "it commanded while another drove or the robot was stopped; send a stop
 WAITS = "another source took over; `{resume}` lets it drive again"
 BY_STOP = "by {by}; `holozen release` lets it drive again"
 VOID = "it was sent before the sim was played or reset, or the robot was spawned"
-UNKNOWN_CALLER = "an unknown caller"
 
 
 class Sent(NamedTuple):

@@ -121,7 +121,7 @@ class Base:
         self._pose, self._moved_at, self._status_due = (0.0, 0.0, 0.0), now, now
         folder = Path(state) if state else default_folder()
         self._stops = StopFiles(folder, bus.networks, bus.node) if folder else None
-        if self._stops and (by := self._stops.read(robot)):
+        if self._stops and (by := self._stops.read(robot)) is not None:
             self._arbiter.stop(by, now)
             self._stops.write(robot, by)
             still = f"{robot or 'the robot'} is still stopped by {by}"
@@ -231,7 +231,7 @@ class Base:
         return self._keep_stop()
 
     def _keep_stop(self) -> str:
-        return self._stops.write(self._robot, self._arbiter.stopped_by or "") if self._stops else ""
+        return self._stops.write(self._robot, self._arbiter.stopped_by) if self._stops else ""
 
     def _publish_status(self, now: float) -> None:
         status = self._input.status(now)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
+UNKNOWN_CALLER = "an unknown caller"  # who set a stop whose request names nobody
 OVER_LIMITS = "over the limits"  # begins the reason why a command was clamped, which is obeyed
 
 
