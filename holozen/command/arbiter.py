@@ -51,9 +51,10 @@ class Sent(NamedTuple):
 
     Attributes:
         at: The earliest time at which it may have been sent.
-        unheard: From then on its source may have commanded without being heard: the time of its
-            echo, or an earlier one if samples are missing. A command without a stamp is believed:
-            the time at which it was read.
+        unheard: Since then its source may have sent commands that have not arrived. That is `at`;
+            or if the numbers have a gap, the time at which the command before the gap was read.
+            Without a stamp it is the time of reading: such a source is believed to have sent
+            nothing else.
         silence: For how long, at least, its source had sent nothing before it.
     """
 
@@ -296,7 +297,7 @@ class Arbiter:
             return AppliedForces(())
         return driver.motion if isinstance(driver.motion, AppliedForces) else AppliedForces(())
 
-    def holds(self, name: str, rank: int, now: float) -> bool:
+    def must_wait(self, name: str, rank: int, now: float) -> bool:
         """Whether a source has to wait for `resume`, or has to let go, before it may drive."""
         source = _source(name, rank)
         record = self._record(source, self.driver(now))
@@ -307,7 +308,7 @@ class Arbiter:
         return has_commanded or record.waits or self._yields(source.rank)
 
     @property
-    def held(self) -> bool:
+    def autopilots_wait(self) -> bool:
         """Whether every autopilot waits for `resume`, since a source above them has driven."""
         return self.state.highest < AUTOPILOT
 
@@ -396,14 +397,14 @@ class Arbiter:
     def _note_motion(
         self, source: Source, driver: Driver | None, now: float, has_commanded: bool
     ) -> None:
-        """Record that a source commanded a motion which is not obeyed. `has_commanded`: it has not
-        let go of an earlier one.
+        """Record that a source commanded a motion in vain, so that it has to let go, or to wait for
+        `resume`. `has_commanded`: it has not let go of an earlier motion yet.
         """
         other = _other(source, driver)
         other_moves = other is not None and not is_stop(other.motion)
         is_equal = other is not None and other_moves and source.rank == other.source.rank
-        is_held_key = source.rank == PERSON and self._record(source, driver).waits
-        if self.state.stopped_by or has_commanded or is_equal or is_held_key:
+        is_key_down = source.rank == PERSON and self._record(source, driver).waits
+        if self.state.stopped_by or has_commanded or is_equal or is_key_down:
             self._update(source, commanded=self.time.at(now))
         if other and other_moves and source.rank > other.source.rank:
             self._update(source, waits=True)
@@ -511,8 +512,8 @@ class Arbiter:
         return self.velocity_timeout if is_velocity else COMMAND_SILENCE
 
     def _is_overruled(self, case: Case) -> bool:
-        """Whether another source with a fresh command keeps this one off: one above it, and of
-        motions an equal.
+        """Whether another source keeps this one off by a fresh command: one of a higher rank, or if
+        this is a motion, one of the same rank.
         """
         other = case.other
         if other is None or self.time.at(case.now) - other.sent > KEEPS_OFF:

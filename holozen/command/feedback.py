@@ -13,7 +13,7 @@ from holozen.console import report as report_line
 FRESH = 1.0  # s; after that a robot whose status came is gone
 COVERED = 3  # statuses after a command, of which the last was sent after the command has been read
 EVERY = 0.1  # s between two looks in a pause
-HOLDING = 0.3  # s within which a status tells who is held after a stop; it comes at 10 Hz
+HELD_WITHIN = 0.3  # s within which a status tells who is held after a stop; it comes at 10 Hz
 # prefixes of its reasons for commands that took too long
 LATE = (Outcome.HELD_UP.value, Outcome.OLD.value)
 OVERRULED = "overruled"  # prefix of its reason when a higher source drives
@@ -22,7 +22,7 @@ SILENT = "its status no longer comes: its sim has ended, hangs, or cannot be rea
 ONLY_TURNS = "linear.y is ignored: this robot's drive only goes forward, backward and turns"
 HELD = "held, since another source took over"
 RESUME = "; `{command}` lets it drive again"
-HOLDS = "{driver} is held now, as by any stop of an equal; `{command}` lets it drive again"
+NOW_HELD = "{driver} is held now, as by any stop of an equal; `{command}` lets it drive again"
 
 
 def verdict(status: Any, source: str) -> str | None:
@@ -70,10 +70,10 @@ def verdict_on_part(status: Any, before: Any, source: str) -> str | None:
 class CommandFeedback:
     """Reports when a robot starts or stops obeying a `source`, by the `latest` status on `key`.
 
-    If the commands are no velocities (`is_velocity`) but move joints or are forces, they are judged
-    by `verdict_on_part`. `more` says more of why the robot does not obey, given the source that
-    drives instead, if any. It takes round trips, and is called in a thread: who sends nothing
-    meanwhile has let go, or has to begin anew. `told` waits for what is reported so.
+    With `is_velocity` the commands are velocities; others are judged by `verdict_on_part`. `more`
+    adds to a report why the robot does not obey, given the source that drives instead (empty:
+    none). It takes round trips to find out, so it is called in a thread, while this one goes on to
+    send commands; `told` waits until all is reported.
     """
 
     def __init__(
@@ -171,15 +171,15 @@ class CommandFeedback:
             self._telling.join()
 
     def report_held(self) -> None:
-        """After a stop was sent while another source drove: report that it holds that one, if it
-        does and is there.
+        """After a stop was sent while another source drove: report that this one now waits for
+        `resume`, once a status says so.
         """
-        deadline = time.monotonic() + HOLDING
+        deadline = time.monotonic() + HELD_WITHIN
         while self._driver and (left := deadline - time.monotonic()) > 0:
             status, _ = self._latest.read()
             if status and any(each.source == self._driver and each.held for each in status.sources):
                 if not (self._more and self._more(self._driver)):
-                    self._report(HOLDS.format(driver=self._driver, command=self._resume))
+                    self._report(NOW_HELD.format(driver=self._driver, command=self._resume))
                 return
             self._latest.wait(self._latest.count, left)
 

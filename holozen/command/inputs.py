@@ -163,9 +163,10 @@ class Input(Generic[M]):
         is_whole: bool = False,
     ) -> bool:
         """Pass a command's motion to an arbiter, and count it. Returns whether it is obeyed.
-        `parts` are those that it commands, and whether it moves them. While its source moves
-        another part, a stop lets go of nothing, and it stops the robot only if the source drives
-        that, or if it `is_whole`: one of the robot, not of its parts.
+
+        `parts` are the topics or joints that it commands, each with whether it moves that. With
+        `is_whole` it commands the whole robot instead. By a zero for one part a source has not let
+        go while it moves another one; unless it drives the robot, it does not stop it by that.
         """
         source, rank, now = command.source, command.rank, command.moment.now
         moves = arbiter.parts.record(Source(source, rank), parts, arbiter.time.at(now))
@@ -249,7 +250,7 @@ class TwistInput(Input[Twist | TwistStamped]):
 
     def status(self, now: float) -> CommandStatus:
         """The source that drives, the sources of recent commands, and the counts so far."""
-        driver, held = self.arbiter.driver(now), self.arbiter.holds
+        driver = self.arbiter.driver(now)
         driver = None if driver and driver.gone else driver
         obeyed = driver.source.name if driver else ""
         # that of joints is no velocity
@@ -258,7 +259,7 @@ class TwistInput(Input[Twist | TwistStamped]):
             commanded=Twist.planar(*motion),
             obeyed=obeyed,
             priority=PRIORITIES[driver.source.rank] if driver else "",
-            held=self.arbiter.held,
+            held=self.arbiter.autopilots_wait,
             resumed=self.arbiter.resumed,
             accepted=self.stats.accepted,
             refused=dict(self.stats.refused),
@@ -268,7 +269,12 @@ class TwistInput(Input[Twist | TwistStamped]):
             stopped=self.arbiter.stopped_by or "",
             sources=[
                 CommandSource(
-                    source, PRIORITIES[rank], rate, source == obeyed, held(source, rank, now), delay
+                    source,
+                    PRIORITIES[rank],
+                    rate,
+                    obeyed=source == obeyed,
+                    held=self.arbiter.must_wait(source, rank, now),
+                    delay=delay,
                 )
                 for source, rank, rate, delay in self._rates.recent(now)
             ],
