@@ -7,7 +7,7 @@ import time
 
 from holozen.bus import Bus, Latest
 from holozen.limits import Planar
-from holozen.messages import Header, Odometry, SimulationStatus
+from holozen.messages import CommandStatus, Header, Odometry, SimulationStatus
 from holozen.messages import geometry_msgs as gm
 from holozen.messages.simulation_interfaces import SimulationState
 from holozen.rotation import XYZ, XYZW
@@ -44,12 +44,13 @@ def transform(header: Header, child: str, position: XYZ, rotation: XYZW) -> gm.T
 
 class RobotFeedback(Latest[Odometry]):
     """The newest odometry on `key`, for a driver, which has to know when its robot is another one,
-    or starts again.
+    or starts again. The commands of `bus` move that robot, whose cmd_vel_status is `status`.
     """
 
-    def __init__(self, bus: Bus, key: str) -> None:
+    def __init__(self, bus: Bus, key: str, status: Latest[CommandStatus]) -> None:
         super().__init__(bus.state(key, Odometry))
         self._writers = bus.writers(key)
+        self._source, self._status = bus.source, status
         self._sim = bus.latest("simulation_status", SimulationStatus)
         self._before: Odometry | None = None
         self._epoch: int | None = None
@@ -76,11 +77,20 @@ class RobotFeedback(Latest[Odometry]):
         return sim is not None and sim.state == SimulationState.STATE_PAUSED and age < SIM_SILENCE
 
     def rests(self, since: float) -> bool:
-        """Whether what was received after `since` (s, monotonic) shows a robot at rest."""
+        """Whether odom shows rest after a stop that was sent first at `since` (s, monotonic).
+
+        Only odom that was sent after the robot had heard the stop counts: over a slow link, that
+        which comes before may show a robot that had not begun to move. A robot without a status is
+        taken to hear at once.
+        """
         odom, age = self.read()
-        return (
-            odom is not None and time.monotonic() - age > since and odom.twist.twist.is_slow(RESTS)
-        )
+        if odom is None:
+            return False
+        status, _ = self._status.read()
+        trip = round_trip(status, self._source) if status else 0.0
+        if trip is None:
+            return False
+        return time.monotonic() - age > since + trip and odom.twist.twist.is_slow(RESTS)
 
     def poll_removed(self) -> bool:
         """Whether a publisher of its odom has left since the last call: it was removed, though
@@ -107,6 +117,14 @@ class RobotFeedback(Latest[Odometry]):
         super().close()
         self._writers.close()
         self._sim.close()
+
+
+def round_trip(status: CommandStatus, source: str) -> float | None:
+    """Seconds from the beat that the last command of `source` returned until it was read: the way
+    there and back, and up to 50 ms between two beats; 0 for a command without a beat. None if the
+    robot has heard nothing from it lately.
+    """
+    return next((one.delay for one in status.sources if one.source == source), None)
 
 
 def _starts_again(before: Odometry, now: Odometry) -> bool:

@@ -12,7 +12,10 @@ from holozen.messages import named
 if TYPE_CHECKING:
     from holozen.messages import Message
 
-COMMAND_SILENCE = 0.5  # s; a robot without a fresh command for this long stops
+# s; without a command for so long a robot stops, unless its file sets another time for velocities
+COMMAND_SILENCE = 0.5
+# s; a motion that may have been sent longer ago is refused. An older one was over by silence.
+MAX_COMMAND_AGE = COMMAND_SILENCE
 ODOM_SILENCE = 0.2  # s; older odometry is stale, unless it comes at a slower rate
 SIM_SILENCE = 1.0  # s; an older status of a sim is stale
 MAX_ENTITIES = 1000  # of one sim; each takes time at every step

@@ -14,6 +14,7 @@ from holozen.check.spelling import is_clear, nearest
 from holozen.check.subject import Subject, split
 from holozen.robot.errors import RobotError
 from holozen.robot.files.elements import LARGEST, Tag
+from holozen.robot.files.gazebo_plugins import drive_tags
 from holozen.robot.files.sdf import IN_WORLD, NOT_SIMULATED
 from holozen.robot.files.sdf import KNOWN as KNOWN_IN_SDF
 from holozen.robot.model import JOINT_KINDS
@@ -33,9 +34,8 @@ def _set(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-def _in_both_spellings(text: str) -> frozenset[str]:
+def _in_both_spellings(names: frozenset[str]) -> frozenset[str]:
     """The names in snake_case, as in ROS 2 and gz-sim, and in camelCase, as in ROS 1."""
-    names = _set(text)
     return names | {re.sub("_(.)", lambda found: found[1].upper(), name) for name in names}
 
 
@@ -105,27 +105,17 @@ GAZEBO = _set(
 """Elements in <gazebo>, which may contain others too."""
 
 PLUGIN = _set("broadcastTF publishOdomTF publishWheelTF") | _in_both_spellings(
-    """always_on angular back_left_joint back_right_joint body_name broadcast_tf
-    broadcast_transform camera_info_topic_name camera_name child_frame_id cmd_timeout
-    command_timeout command_topic control_period covariance_x covariance_y covariance_yaw
-    dimensions force_frame frame_id frame_name front_left_joint front_right_joint gaussian_noise
-    image_topic_name initial_angular initial_linear initial_position joint_name left_front_joint
-    left_joint left_rear_joint legacy_mode linear link_name max_acceleration
-    max_angular_acceleration max_angular_jerk max_angular_velocity max_jerk
-    max_linear_acceleration max_linear_jerk max_linear_velocity max_velocity
-    max_wheel_acceleration max_wheel_torque min_acceleration min_angular_acceleration
-    min_angular_jerk min_angular_velocity min_jerk min_linear_acceleration min_linear_jerk
-    min_linear_velocity min_velocity namespace num_wheel_pairs odom_publish_frequency odom_topic
-    odometry_frame odometry_origin odometry_rate odometry_source odometry_topic parameters
-    publish_odom publish_odom_tf publish_odometry publish_odometry_tf publish_rate publish_tf
-    publish_wheel_joint_state publish_wheel_tf rear_left_joint rear_right_joint remapping
-    right_front_joint right_joint right_rear_joint robot_base_frame robot_base_link
-    robot_namespace robot_param robot_sim_type ros ros_debug_level rpy_offset rpy_offsets
-    service_name tf_topic time_before_collision topic topic_name torque update_rate
-    wheel_acceleration wheel_diameter wheel_radius wheel_separation wheel_torque wheelbase
-    xyz_offset xyz_offsets"""
+    drive_tags()
+    | _set(
+        """always_on angular body_name camera_info_topic_name camera_name control_period dimensions
+        force_frame frame_name image_topic_name initial_position joint_name linear link_name
+        namespace parameters publish_wheel_joint_state publish_wheel_tf rear_left_joint
+        rear_right_joint remapping robot_base_link robot_param robot_sim_type ros ros_debug_level
+        rpy_offset rpy_offsets service_name tf_topic topic_name xyz_offset xyz_offsets"""
+    )
 )
-"""Elements in a <plugin>, in the spelling of ROS 1, ROS 2 and gz-sim; a plugin may have others too.
+"""Elements in a <plugin>, in the spelling of ROS 1, ROS 2 and gz-sim: those of drives, and others
+of Gazebo; a plugin may have more.
 """
 
 SDF = frozenset(KNOWN_IN_SDF).union(

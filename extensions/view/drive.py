@@ -2,7 +2,6 @@
 them.
 """
 
-import math
 import threading
 import time
 from collections.abc import Callable, Collection
@@ -44,12 +43,12 @@ class Driver:
     def __init__(self, bus: Bus, command: str, odometry: str) -> None:
         self.namespace = command.rpartition("/")[0]
         self._bus, self.command = bus, command
-        self.odom = RobotFeedback(bus, odometry)
         self._status = bus.latest(f"{command}_status", CommandStatus)
+        self.odom = RobotFeedback(bus, odometry, self._status)
         self._beats = bus.echoes(command)
         self._helm, self._lock = Helm(), threading.Lock()
         self._echo = b""  # the beats that the last page that drove had heard
-        self._sent_at = -math.inf
+        self._sent_at: float | None = None  # s; of the last command
         self._fault = ""  # the last that was reported
 
     @cached_property
@@ -134,7 +133,8 @@ class Driver:
             if self.odom.rests(since):
                 self._helm.rest()
                 return False
-            if now - self._sent_at >= REPEAT or self._sent_at < since:
+            last = self._sent_at
+            if last is None or last < since or now - last >= REPEAT:
                 self._put(STOP, now)
             return True
 

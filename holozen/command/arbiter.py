@@ -23,7 +23,7 @@ from msgspec.structs import replace
 
 from holozen.command.command_time import ROUNDING, CommandTime
 from holozen.command.motion import AppliedForce, AppliedForces, Motion, is_stop
-from holozen.command.outcome import Decision, Outcome, refusal
+from holozen.command.outcome import UNKNOWN_CALLER, Decision, Outcome, refusal
 from holozen.limits import STOP
 from holozen.transport.samples import PRIORITIES
 from holozen.wire import COMMAND_SILENCE, release_command, resume_command
@@ -32,6 +32,12 @@ from holozen.wire import COMMAND_SILENCE, release_command, resume_command
 PERSON = PRIORITIES.index("INTERACTIVE_HIGH")
 # from here down, a source waits for `resume` once a higher one has driven
 AUTOPILOT = PRIORITIES.index("DATA_LOW")
+# s; so long the driver's last command keeps lower ranks off, and motions of equals
+KEEPS_OFF = COMMAND_SILENCE
+# s of silence that let go, unless a robot's velocities count for longer
+LETS_GO = COMMAND_SILENCE
+# s; so long a topic or joint that a source set moving counts as moved by it
+PART_MOVES = COMMAND_SILENCE
 MAX_NAMES = 100  # sources of a rank with a record of their own: names come over the wire
 MAX_PARTS = 100  # sources whose moving topics or joints are known
 LET_GO = (
@@ -41,7 +47,6 @@ LET_GO = (
 WAITS = "another source took over; `{resume}` lets it drive again"
 BY_STOP = "by {by}; `{release}` lets it drive again"
 VOID = "it was sent before the sim was played or reset, or the robot was spawned; send it again"
-UNKNOWN_CALLER = "an unknown caller"
 
 
 class Sent(NamedTuple):
@@ -49,9 +54,10 @@ class Sent(NamedTuple):
 
     Attributes:
         at: The earliest time at which it may have been sent.
-        unheard: From then on its source may have commanded without being heard: the time of its
-            echo, or an earlier one if samples are missing. A command without a stamp is believed:
-            the time at which it was read.
+        unheard: Since then its source may have sent commands that have not arrived. That is `at`;
+            or if the numbers have a gap, the time at which the command before the gap was read.
+            Without a stamp it is the time of reading: such a source is believed to have sent
+            nothing else.
         silence: For how long, at least, its source had sent nothing before it.
     """
 
@@ -197,8 +203,8 @@ class State(Struct):
         records: By rank.
         highest: The highest rank that has driven since the last resume.
         stopped_by: Who set the software stop; None while it is not set.
-        released: When that was released last (s): commands sent before were sent to a stopped
-            robot.
+        released: When that was released last (s), if ever: commands sent before were sent to a
+            stopped robot.
         began: The last play, reset or spawn (s): commands sent before move nothing.
     """
 
@@ -206,18 +212,23 @@ class State(Struct):
     records: dict[int, Records] = field(default_factory=dict)
     highest: int = AUTOPILOT + 1
     stopped_by: str | None = None
-    released: float = 0.0
+    released: float | None = None
     began: float = 0.0
+
+    def was_released_after(self, time: float) -> bool:
+        """Whether a software stop ended after `time` (s)."""
+        return self.released is not None and time < self.released
 
 
 class Arbiter:
     """Chooses which source drives one robot, by the five rules above.
 
-    A source stops driving after `timeout` seconds of silence; with None, it drives until another
-    one commands. Silence is measured on the clock `time`; all methods take real times in s. Reasons
-    name the `robot`.
+    A source that drives joints, or by forces, stops driving after COMMAND_SILENCE. Silence is
+    measured on the clock `time`; all methods take real times in s. Reasons name the `robot`.
 
     Attributes:
+        velocity_timeout: The silence in s after which a source that drives by velocities stops
+            driving; None: it drives until another one commands.
         state: What its decisions depend on.
         resumed: How often `resume` succeeded.
         stopped_at: The last time (s) at which the software stop was set, or set again; None before.
@@ -226,11 +237,14 @@ class Arbiter:
     """
 
     def __init__(
-        self, timeout: float | None, time: CommandTime | None = None, robot: str = ""
+        self,
+        velocity_timeout: float | None = COMMAND_SILENCE,
+        time: CommandTime | None = None,
+        robot: str = "",
     ) -> None:
         self._robot = robot
         self.time = time or CommandTime()
-        self.timeout = timeout
+        self.velocity_timeout = velocity_timeout
         self.parts = Parts()
         self.state = State()
         self.resumed = 0
@@ -286,7 +300,7 @@ class Arbiter:
             return AppliedForces(())
         return driver.motion if isinstance(driver.motion, AppliedForces) else AppliedForces(())
 
-    def holds(self, name: str, rank: int, now: float) -> bool:
+    def must_wait(self, name: str, rank: int, now: float) -> bool:
         """Whether a source has to wait for `resume`, or has to let go, before it may drive."""
         source = _source(name, rank)
         record = self._record(source, self.driver(now))
@@ -297,7 +311,7 @@ class Arbiter:
         return has_commanded or record.waits or self._yields(source.rank)
 
     @property
-    def held(self) -> bool:
+    def autopilots_wait(self) -> bool:
         """Whether every autopilot waits for `resume`, since a source above them has driven."""
         return self.state.highest < AUTOPILOT
 
@@ -365,7 +379,7 @@ class Arbiter:
         source, driver = _source(name, rank), self.driver(now)
         # Of a refused one the earliest time counts: it moves nothing, and its source may not have
         # let go.
-        was_stopped = sent is not None and min(sent.at, sent.unheard) < self.state.released
+        was_stopped = sent is not None and self.state.was_released_after(min(sent.at, sent.unheard))
         has_commanded = was_stopped or self._record(source, driver).commanded is not None
         self._note_motion(source, driver, now, has_commanded)
 
@@ -386,14 +400,14 @@ class Arbiter:
     def _note_motion(
         self, source: Source, driver: Driver | None, now: float, has_commanded: bool
     ) -> None:
-        """Record that a source commanded a motion which is not obeyed. `has_commanded`: it has not
-        let go of an earlier one.
+        """Record that a source commanded a motion in vain, so that it has to let go, or to wait for
+        `resume`. `has_commanded`: it has not let go of an earlier motion yet.
         """
         other = _other(source, driver)
         other_moves = other is not None and not is_stop(other.motion)
         is_equal = other is not None and other_moves and source.rank == other.source.rank
-        is_held_key = source.rank == PERSON and self._record(source, driver).waits
-        if self.state.stopped_by or has_commanded or is_equal or is_held_key:
+        is_key_down = source.rank == PERSON and self._record(source, driver).waits
+        if self.state.stopped_by or has_commanded or is_equal or is_key_down:
             self._update(source, commanded=self.time.at(now))
         if other and other_moves and source.rank > other.source.rank:
             self._update(source, waits=True)
@@ -456,12 +470,12 @@ class Arbiter:
         self.state.began = now
         self._drive(None)
 
-    def set_timeout(self, timeout: float | None, now: float) -> None:
-        """Set the `timeout` in s from `now` on. A longer one does not revive a source that has
-        fallen silent.
+    def set_velocity_timeout(self, timeout: float | None, now: float) -> None:
+        """Set the `velocity_timeout` in s from `now` on. A longer one does not revive a source that
+        has fallen silent.
         """
         self._drive(self.driver(now))
-        self.timeout = timeout
+        self.velocity_timeout = timeout
 
     def settle(self, now: float) -> None:
         """The robot is removed at `now`: who has been silent until then has let go. Another one may
@@ -497,16 +511,15 @@ class Arbiter:
 
     def _patience(self, driver: Driver) -> float | None:
         """The silence in s after which a driver no longer drives; None: never."""
-        if not isinstance(driver.motion, tuple):
-            return COMMAND_SILENCE
-        return self.timeout
+        is_velocity = isinstance(driver.motion, tuple)
+        return self.velocity_timeout if is_velocity else COMMAND_SILENCE
 
     def _is_overruled(self, case: Case) -> bool:
-        """Whether another source with a fresh command keeps this one off: one above it, and of
-        motions an equal.
+        """Whether another source keeps this one off by a fresh command: one of a higher rank, or if
+        this is a motion, one of the same rank.
         """
         other = case.other
-        if other is None or self.time.at(case.now) - other.sent > COMMAND_SILENCE:
+        if other is None or self.time.at(case.now) - other.sent > KEEPS_OFF:
             return False
         if is_stop(case.motion):
             return case.source.rank > other.source.rank
@@ -538,7 +551,7 @@ class Arbiter:
         not been silent since it commanded in vain.
         """
         sent = case.sent
-        if sent.unheard < self.state.released:
+        if self.state.was_released_after(sent.unheard):
             return True
         commanded = self._record(case.source, case.driver).commanded
         if commanded is None:
@@ -552,7 +565,7 @@ class Arbiter:
 
     def _silence_limit(self) -> float | None:
         """The silence in s that lets go; None if only a stop does."""
-        return None if self.timeout is None else max(self.timeout, COMMAND_SILENCE)
+        return None if self.velocity_timeout is None else max(self.velocity_timeout, LETS_GO)
 
     def _on_clock(self, sent: float, now: float) -> float:
         """A real time on the clock of commands; while the sim is paused, commands do not age."""
@@ -586,8 +599,8 @@ class Arbiter:
 
 
 class Parts:
-    """The topics or joints that each source has set moving in the last 0.5 s, and not stopped
-    since.
+    """The topics or joints that each source has set moving in the last PART_MOVES seconds, and not
+    stopped since.
 
     A source may command them one by one: then a zero for one is no stop while it moves another.
     Names come over the wire, so of too many sources the one that has been silent for the longest
@@ -602,9 +615,7 @@ class Parts:
         its source still moves any.
         """
         mine = {
-            name: at
-            for name, at in self._moving.pop(source, {}).items()
-            if time - at <= COMMAND_SILENCE
+            name: at for name, at in self._moving.pop(source, {}).items() if time - at <= PART_MOVES
         }
         for name, moves in parts:
             mine.pop(name, None)
@@ -617,10 +628,10 @@ class Parts:
         return bool(mine)
 
     def settle(self, time: float) -> None:
-        """Forget what no source has moved for 0.5 s by `time` (s)."""
+        """Forget what no source has moved for PART_MOVES by `time` (s)."""
         for source, parts in self._moving.items():
             self._moving[source] = {
-                name: at for name, at in parts.items() if time - at <= COMMAND_SILENCE
+                name: at for name, at in parts.items() if time - at <= PART_MOVES
             }
 
     def inherit(self, other: Parts, time: float) -> None:

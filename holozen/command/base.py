@@ -118,10 +118,10 @@ class Base:
         self._inputs.add([self._input.reader(commands), *services.stop, *services.others])
         self._reads, self._key, self._name = ReadTimes(now), key, robot or bus.node
         self._frames = key_for(frame, robot), key_for(base_frame, robot)
-        self._pose, self._moved_at, self._status_at = (0.0, 0.0, 0.0), now, -math.inf
+        self._pose, self._moved_at, self._status_due = (0.0, 0.0, 0.0), now, now
         folder = Path(state) if state else default_folder()
         self._stops = StopFiles(folder, bus.networks, bus.node) if folder else None
-        if self._stops and (by := self._stops.read(robot)):
+        if self._stops and (by := self._stops.read(robot)) is not None:
             self._arbiter.stop(by, now)
             self._stops.write(robot, by)
             still = f"{robot or 'the robot'} is still stopped by {by}"
@@ -167,7 +167,7 @@ class Base:
             if rival := next((one for one in others if one.session < self._bus.id), None):
                 raise self._taken(rival)
         self._beat.poll()
-        if now >= self._status_at:
+        if now >= self._status_due:
             self._publish_status(now)
         now = time.monotonic()  # this process may have been suspended since
         self._stop_unasked(now)
@@ -231,7 +231,7 @@ class Base:
         return self._keep_stop()
 
     def _keep_stop(self) -> str:
-        return self._stops.write(self._robot, self._arbiter.stopped_by or "") if self._stops else ""
+        return self._stops.write(self._robot, self._arbiter.stopped_by) if self._stops else ""
 
     def _publish_status(self, now: float) -> None:
         status = self._input.status(now)
@@ -241,4 +241,4 @@ class Base:
             status.time_before_collision = self._monitor.seconds
             status.limited = self._monitor.reason
         self._status.put(status)
-        self._status_at = now + STATUS_EVERY
+        self._status_due = now + STATUS_EVERY

@@ -25,10 +25,8 @@ DEAF = (
 
 
 class Deafness:
-    """Counts how long no answer has come, in passes of the loop: a suspension, or a slow machine,
-    is no deafness.
-
-    A pass counts as `longest` seconds at most.
+    """Measures for how long no answer has come. A pass of the loop counts as `longest` seconds at
+    most, so that a suspension, or a slow machine, is no deafness.
     """
 
     def __init__(self, longest: float = PASS) -> None:
@@ -40,8 +38,8 @@ class Deafness:
     def judge(
         self, now: float, answers: int, limit: float, matters: Callable[[], bool] = lambda: True
     ) -> bool:
-        """Whether there have been no more than these `answers` for `limit` seconds at `now` (s),
-        and it `matters`: if not, the time begins anew, as after an answer.
+        """Whether the number of `answers` has been the same for `limit` seconds at `now` (s). While
+        that does not matter, by `matters`, nothing is measured, as if an answer had come.
         """
         passed, self._at = min(now - self._at, self._longest), now
         if answers != self._answers:

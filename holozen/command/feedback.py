@@ -7,14 +7,13 @@ from typing import Any
 
 from holozen import wire
 from holozen.bus import Latest
-from holozen.command.outcome import Outcome
+from holozen.command.outcome import OVER_LIMITS, Outcome
 from holozen.console import report as report_line
 
 FRESH = 1.0  # s; after that a robot whose status came is gone
 COVERED = 3  # statuses after a command, of which the last was sent after the command has been read
 EVERY = 0.1  # s between two looks in a pause
-HOLDING = 0.3  # s within which a status tells who is held after a stop; it comes at 10 Hz
-LIMITED = "over the limits"  # prefix of the sim's reason when it drives slower than commanded
+HELD_WITHIN = 0.3  # s within which a status tells who is held after a stop; it comes at 10 Hz
 # prefixes of its reasons for commands that took too long
 LATE = (Outcome.HELD_UP.value, Outcome.OLD.value)
 OVERRULED = "overruled"  # prefix of its reason when a higher source drives
@@ -29,28 +28,34 @@ NOT_RECEIVED = "the sim has not received it: it hangs, or is flooded; `holozen d
 ONLY_TURNS = "linear.y is ignored: this robot's drive only goes forward, backward and turns"
 HELD = "held, since another source took over"
 AGAIN = "; `{command}` lets it drive again"
-HOLDS = "this stop also holds {driver}, which drove; `{command}` lets it drive again"
+NOW_HELD = "this stop also holds {driver}, which drove; `{command}` lets it drive again"
 
 
 def verdict(status: Any, source: str) -> str | None:
-    """Why the robot does not follow the commands of `source`, by a CommandStatus; empty if it does.
-    None if the sim has not received any yet: a status sent before the command arrived does not
-    cover it.
+    """Why the robot does not follow the commands of `source`, or follows them within its limits
+    alone (OVER_LIMITS), by a CommandStatus; empty if it follows them. None if the sim has not
+    received any yet: a status sent before the command arrived does not cover it.
     """
     mine = next((each for each in status.sources if each.source == source), None)
-    own_refusal = status.last_refusal.removeprefix(f"{source}: ")
-    if own_refusal == status.last_refusal:
-        own_refusal = ""
+    own_refusal = _own(status.last_refusal, source)
     if status.stopped:
         return f"{STOPPED}{status.stopped}"
     if status.obeyed == source or (mine and mine.obeyed):
-        return own_refusal if own_refusal.startswith(LIMITED) else ""
+        return _own(status.last_clamped, source)
     kind = own_refusal.partition(":")[0]
     if kind == "held" or (mine and mine.held and kind == ""):
         return HELD
     if mine and status.obeyed and kind in ("", OVERRULED):
         return f"{status.obeyed}{DRIVES}"
     return own_refusal or None
+
+
+def _own(report: str, source: str) -> str:
+    """The reason in a status's report of a refused or clamped command; empty if that is of another
+    source.
+    """
+    whose, _, reason = report.partition(": ")
+    return reason if whose == source else ""
 
 
 def verdict_on_part(status: Any, before: Any, source: str) -> str | None:
@@ -71,10 +76,10 @@ def verdict_on_part(status: Any, before: Any, source: str) -> str | None:
 class CommandFeedback:
     """Reports when a robot starts or stops obeying a `source`, by the `latest` status on `key`.
 
-    If the commands are no velocities (`is_velocity`) but move joints or are forces, they are judged
-    by `verdict_on_part`. `more` says more of why the robot does not obey, given the source that
-    drives instead, if any. It takes round trips, and is called in a thread: who sends nothing
-    meanwhile has let go, or has to begin anew. `told` waits for what is reported so.
+    With `is_velocity` the commands are velocities; others are judged by `verdict_on_part`. `more`
+    adds to a report why the robot does not obey, given the source that drives instead (empty:
+    none). It takes round trips to find out, so it is called in a thread, while this one goes on to
+    send commands; `told` waits until all is reported.
     """
 
     def __init__(
@@ -135,7 +140,7 @@ class CommandFeedback:
         is_late = why.startswith(LATE)
         # each names another age
         if why != self._reported and not (is_late and self._reported.startswith(LATE)):
-            if why and not why.startswith(LIMITED):
+            if why and not why.startswith(OVER_LIMITS):
                 stopped = why.startswith(STOPPED)
                 command = self._resume if why == HELD else self._release if stopped else ""
                 advice = AGAIN.format(command=command) if command else ""
@@ -149,10 +154,10 @@ class CommandFeedback:
         ):
             self._report(ONLY_TURNS)
             self._has_noted = True
-        self._reported, self.refusal = why, "" if why.startswith(LIMITED) else why
+        self._reported, self.refusal = why, "" if why.startswith(OVER_LIMITS) else why
         return True
 
-    def wait(self, stop: threading.Event, seconds: float, after: int = -1) -> None:
+    def wait(self, stop: threading.Event, seconds: float, after: int = 0) -> None:
         """Wait until the sim has judged the commands, by more than `after` statuses; report if it
         has not after so many `seconds`.
         """
@@ -175,15 +180,15 @@ class CommandFeedback:
             self._telling.join()
 
     def report_held(self) -> None:
-        """After a stop was sent while another source drove: report that it holds that one, if it
-        does and is there.
+        """After a stop was sent while another source drove: report that this one now waits for
+        `resume`, once a status says so.
         """
-        deadline = time.monotonic() + HOLDING
+        deadline = time.monotonic() + HELD_WITHIN
         while self._driver and (left := deadline - time.monotonic()) > 0:
             status, _ = self._latest.read()
             if status and any(each.source == self._driver and each.held for each in status.sources):
                 if not (self._more and self._more(self._driver)):
-                    self._report(HOLDS.format(driver=self._driver, command=self._resume))
+                    self._report(NOW_HELD.format(driver=self._driver, command=self._resume))
                 return
             self._latest.wait(self._latest.count, left)
 

@@ -17,7 +17,7 @@ from holozen.command.outcome import Decision, Outcome, refusal
 from holozen.messages import Message
 from holozen.transport.pubsub import Received
 from holozen.transport.samples import Echo, Stamp
-from holozen.wire import COMMAND_SILENCE
+from holozen.wire import MAX_COMMAND_AGE
 
 M = TypeVar("M", bound=Message)
 K = TypeVar("K", bound=Hashable)
@@ -27,7 +27,8 @@ T = TypeVar("T")
 BEGIN_AGE = 0.15
 # streams or speakers; beyond, the one that has not commanded for the longest time is forgotten
 MAX_KNOWN = 256
-AGES = (0.05, COMMAND_SILENCE)  # s; the range of `max_age`
+AGES = (0.05, MAX_COMMAND_AGE)  # s; the range of `max_age`
+PAUSE = 0.5  # s between two late commands, which begins a new series of them
 
 OLD = (
     "it may be {age:.2f} s old, and the limit is {limit:g} s; send it again, over a faster network "
@@ -90,9 +91,9 @@ class Speaker(NamedTuple):
     key: str
 
 
-class Heard(NamedTuple):
-    """The last command that was heard of a source on a key: its number, if it has one, and when it
-    was read (s).
+class LastCommand(NamedTuple):
+    """The last command of a source on a key: its number, None without a stamp, and when it was read
+    (s).
     """
 
     number: int | None
@@ -109,8 +110,8 @@ class Position(NamedTuple):
 
 
 class Late(NamedTuple):
-    """Commands of a stream that came too late to begin with, one after the other: when the first
-    and the last of them arrived (s).
+    """A series of commands of a stream that came too late to begin with: when its first and its
+    last one arrived (s). A PAUSE ends the series.
     """
 
     first: float
@@ -163,9 +164,9 @@ class Freshness(Generic[M]):
         self._senders = senders
         self._arbiters = tuple(arbiters)
         self.stops = stops
-        self.max_age = COMMAND_SILENCE
+        self.max_age = MAX_COMMAND_AGE
         self._newest: OrderedDict[Stream, Position] = OrderedDict()
-        self._heard: OrderedDict[Speaker, Heard] = OrderedDict()
+        self._last: OrderedDict[Speaker, LastCommand] = OrderedDict()
         self._held_up: OrderedDict[Stream, Late] = OrderedDict()
 
     def sift(self, arrived: Iterable[Received[M]], now: float, since: float) -> Iterator[Judged[M]]:
@@ -200,8 +201,8 @@ class Freshness(Generic[M]):
     def _unstamped(self, received: Received[M], stops: bool, now: float, since: float) -> Judged[M]:
         """Judge a command whose age is unknown: it was sent as it arrived."""
         speaker = Speaker(received.source, received.key)
-        before = self._heard.get(speaker)
-        _put(self._heard, speaker, Heard(None, now))
+        before = self._last.get(speaker)
+        _put(self._last, speaker, LastCommand(None, now))
         silence = math.inf if before is None else max(0.0, since - before.at)
         sent = Sent(at=since, unheard=now, silence=silence)
         if stops:
@@ -221,13 +222,13 @@ class Freshness(Generic[M]):
         if beat is None:
             # Its number counts: what follows it is no first command, and nothing between the two
             # was unheard.
-            self._hear(speaker, stamp.number, now, now)
+            self._note_number(speaker, stamp.number, now, now)
             if stops:
                 return Judged(received, Sent(now, now, 0.0))
             unknown = refusal(Outcome.NO_ECHO, NO_ECHO) if is_there else refusal(Outcome.GONE, GONE)
             return Judged(received, Sent(now, now, 0.0), refused=unknown)
         age = self._senders.age(beat, now)
-        sent = self._hear(speaker, stamp.number, now - age, now)
+        sent = self._note_number(speaker, stamp.number, now - age, now)
         stream = Stream(stamp.session, received.priority, received.key)
         before, position = self._newest.get(stream), Position(beat, stamp.number)
         _put(self._newest, stream, max(position, before) if before else position)
@@ -254,24 +255,23 @@ class Freshness(Generic[M]):
         return None
 
     def _note_late(self, stream: Stream, now: float) -> float:
-        """Note that a command came late. Returns when the first of those arrived that came without
-        a pause since.
-        """
+        """Note that a command came late. Returns when the first one of its series arrived (s)."""
         before = self._held_up.get(stream)
-        first = before.first if before and now - before.last <= COMMAND_SILENCE else now
+        first = before.first if before and now - before.last <= PAUSE else now
         _put(self._held_up, stream, Late(first, now))
         return first
 
-    def _hear(self, speaker: Speaker, number: int, at: float, now: float) -> Sent:
-        """Note the number of a command that was sent after `at` (s). Returns what is known of its
-        sending.
+    def _note_number(self, speaker: Speaker, number: int, at: float, now: float) -> Sent:
+        """Note the number of a command that was sent at `at` (s) at the earliest. Returns what is
+        known of its sending: a gap before its number is a time in which its source may have
+        commanded unheard.
         """
-        before = self._heard.get(speaker)
+        before = self._last.get(speaker)
         is_first = number == 0
         # it was overtaken
         if not is_first and before and before.number is not None and number <= before.number:
             return Sent(at, at, 0.0)
-        _put(self._heard, speaker, Heard(number, now))
+        _put(self._last, speaker, LastCommand(number, now))
         if is_first:
             return Sent(at, at)
         if before is None:

@@ -4,7 +4,6 @@ to the arbiters.
 
 from __future__ import annotations
 
-import math
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -20,7 +19,7 @@ from holozen.command.motion import (
     is_stop,
     motion_of,
 )
-from holozen.command.outcome import Decision
+from holozen.command.outcome import OVER_LIMITS, Decision
 from holozen.command.wait_set import Moment, Reader
 from holozen.console import report
 from holozen.limits import STOP, Planar, clamp_speed
@@ -51,6 +50,7 @@ MARK = 0.1  # s between two samples of a count
 REPORT_EVERY = 1.0  # s
 # a second by all robots: if a fleet's driver fails, each of them has something to report
 MAX_LINES = 10
+MAX_REASON = 300  # characters: a sender's name may be long
 M = TypeVar("M", bound=Message)
 
 PARTIAL_STOP = (
@@ -170,9 +170,10 @@ class Input(Generic[M]):
         is_whole: bool = False,
     ) -> bool:
         """Pass a command's motion to an arbiter, and count it. Returns whether it is obeyed.
-        `parts` are those that it commands, and whether it moves them. While its source moves
-        another part, a stop lets go of nothing, and it stops the robot only if the source drives
-        that, or if it `is_whole`: one of the robot, not of its parts.
+
+        `parts` are the topics or joints that it commands, each with whether it moves that. With
+        `is_whole` it commands the whole robot instead. By a zero for one part a source has not let
+        go while it moves another one; unless it drives the robot, it does not stop it by that.
         """
         source, rank, now = command.source, command.rank, command.moment.now
         moves = arbiter.parts.record(Source(source, rank), parts, arbiter.time.at(now))
@@ -256,7 +257,7 @@ class TwistInput(Input[Twist | TwistStamped]):
 
     def status(self, now: float) -> CommandStatus:
         """The source that drives, the sources of recent commands, and the counts so far."""
-        driver, held = self.arbiter.driver(now), self.arbiter.holds
+        driver = self.arbiter.driver(now)
         driver = None if driver and driver.gone else driver
         obeyed = driver.source.name if driver else ""
         # that of joints is no velocity
@@ -265,15 +266,22 @@ class TwistInput(Input[Twist | TwistStamped]):
             commanded=Twist.planar(*motion),
             obeyed=obeyed,
             priority=PRIORITIES[driver.source.rank] if driver else "",
-            held=self.arbiter.held,
+            held=self.arbiter.autopilots_wait,
             resumed=self.arbiter.resumed,
             accepted=self.stats.accepted,
             refused=dict(self.stats.refused),
-            last_refusal=self.stats.last,
+            last_refusal=self.stats.last_refusal,
+            clamped=self.stats.clamped,
+            last_clamped=self.stats.last_clamped,
             stopped=self.arbiter.stopped_by or "",
             sources=[
                 CommandSource(
-                    source, PRIORITIES[rank], rate, source == obeyed, held(source, rank, now), delay
+                    source,
+                    PRIORITIES[rank],
+                    rate,
+                    obeyed=source == obeyed,
+                    held=self.arbiter.must_wait(source, rank, now),
+                    delay=delay,
                 )
                 for source, rank, rate, delay in self._rates.recent(now)
             ],
@@ -293,10 +301,10 @@ class TwistInput(Input[Twist | TwistStamped]):
             and limited != velocity
         ):
             text = (
-                f"over the limits of {self.linear:g} m/s and {self.angular:g} rad/s, clamped: "
+                f"{OVER_LIMITS} of {self.linear:g} m/s and {self.angular:g} rad/s, clamped: "
                 f"{velocity}"
             )
-            self._refuse(command, text, "clamped")
+            self.stats.note_clamped(self.keys[0], text, command.source, command.moment.now)
 
     def _reported(self, command: Command[Twist | TwistStamped]) -> str:
         return self.keys[0]
@@ -451,28 +459,37 @@ class ReportLimit:
     """
 
     def __init__(self) -> None:
-        self._since, self._written = -math.inf, 0
+        self._since: float | None = None  # s; when the second began; None before the first report
+        self._written = 0
 
     def take(self, now: float) -> bool:
         """Whether another report may be written at `now` (s)."""
-        if not 0 <= now - self._since < REPORT_EVERY:
+        if self._since is None or not 0 <= now - self._since < REPORT_EVERY:
             self._since, self._written = now, 0
         self._written += 1
         return self._written <= MAX_LINES
 
 
 class CommandStats:
-    """Counts accepted commands, and refused ones by kind. `last` is the last refusal."""
+    """Counts the commands of one robot, and reports what it does not do as commanded.
+
+    Attributes:
+        accepted: The number of those that were accepted.
+        clamped: The number of those of them that were over the limits.
+        refused: The numbers of refused ones by kind.
+        last_clamped: The source of the last that was clamped, and why; empty if there was none.
+        last_refusal: The same of the last that was refused.
+    """
 
     def __init__(
         self, report: Callable[[str], None] = report, limit: ReportLimit | None = None
     ) -> None:
         self._limit = limit or ReportLimit()
-        self.accepted = 0
+        self.accepted = self.clamped = 0
         self.refused: Counter[str] = Counter()
-        self.last = ""
+        self.last_clamped = self.last_refusal = ""
         self._report = report
-        self._reported = -math.inf
+        self._reported_at: float | None = None  # s; None: nothing was
         self._unreported = 0
 
     def validated(self, received: Received[M], keys: tuple[str, ...], now: float) -> M | None:
@@ -487,13 +504,23 @@ class CommandStats:
     def refuse(self, key: str, kind: str, reason: str, source: str, now: float) -> None:
         """Count and report a refused command of `source` on `key`."""
         self.refused[kind] += 1
-        self.last = f"{source}: {reason}"[:300]
+        self.last_refusal = f"{source}: {reason}"[:MAX_REASON]
+        self._report_some(key, self.last_refusal, now)
+
+    def note_clamped(self, key: str, reason: str, source: str, now: float) -> None:
+        """Count and report a command of `source` on `key` that was obeyed within the limits."""
+        self.clamped += 1
+        self.last_clamped = f"{source}: {reason}"[:MAX_REASON]
+        self._report_some(key, self.last_clamped, now)
+
+    def _report_some(self, key: str, what: str, now: float) -> None:
         self._unreported += 1
-        if now - self._reported < REPORT_EVERY or not self._limit.take(now):
+        is_soon = self._reported_at is not None and now - self._reported_at < REPORT_EVERY
+        if is_soon or not self._limit.take(now):
             return
         more = f" (and {self._unreported - 1} more)" if self._unreported > 1 else ""
-        self._report(f"{key}: from {self.last}{more}")
-        self._reported, self._unreported = now, 0
+        self._report(f"{key}: from {what}{more}")
+        self._reported_at, self._unreported = now, 0
 
 
 def _fault(received: Received[M], keys: tuple[str, ...]) -> tuple[str, str]:

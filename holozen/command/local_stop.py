@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from holozen.command.outcome import UNKNOWN_CALLER
 from holozen.command.stop_files import default_folder
 from holozen.console import report
 from holozen.system import IS_LINUX
@@ -147,7 +148,8 @@ class LocalStops(Declared):
         # To a name, not to the sender's address, which is a path that may be valid in its own
         # process alone.
         reply = self._path.with_name(Path(asked["reply"]).name)
-        rows = self._stop(str(asked["by"]), set(asked["robots"]), set(asked["networks"]))
+        by = str(asked["by"]) or UNKNOWN_CALLER
+        rows = self._stop(by, set(asked["robots"]), set(asked["networks"]))
         with _address(reply) as address:
             here.sendto(json.dumps(rows).encode(), socket.MSG_DONTWAIT, address)
 

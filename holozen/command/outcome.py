@@ -5,6 +5,9 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
+UNKNOWN_CALLER = "an unknown caller"  # who set a stop whose request names nobody
+OVER_LIMITS = "over the limits"  # begins the reason why a command was clamped, which is obeyed
+
 
 class Outcome(Enum):
     """What becomes of a command. The value of a refusal is the word under which it is counted and

@@ -48,13 +48,14 @@ class StopFiles:
     def __init__(self, folder: Path, networks: Iterable[str], reporter: str = "sim") -> None:
         self._all = folder
         self._folders = [folder / _name(network) for network in networks]
-        self._last: dict[str, str] = {}  # robot -> contents of all its files, if known
+        # robot -> contents of all its files, if known; None: it has no file
+        self._last: dict[str, str | None] = {}
         self._reporter = reporter
         self._reported = set[
             tuple[str, bool]
         ]()  # robots whose stop, or release, could not be written
         self._lock = threading.Lock()  # of these three
-        self._wanted: dict[str, str] = {}  # robot -> what is to be written
+        self._wanted: dict[str, str | None] = {}  # robot -> what is to be written
         self._failed: dict[str, str] = {}  # robot -> why that failed, or ""
         self._writer: threading.Thread | None = None
 
@@ -62,26 +63,27 @@ class StopFiles:
         """The files of a robot, one for each network; `robot` is empty for the one at the root."""
         return [folder / _file(robot) for folder in self._folders]
 
-    def read(self, robot: str) -> str:
-        """Who stopped a robot; empty without a file. A file that cannot be read stops it too, and
+    def read(self, robot: str) -> str | None:
+        """Who stopped a robot; None without a file. A file that cannot be read stops it too, and
         is reported; so is one of another network, which does not stop it.
         """
         self._last.pop(robot, None)
         found = {self._read(path, robot) for path in self.paths(robot)}
-        if found == {""}:
+        if found == {None}:
             for path in self._all.glob(f"*/{_file(robot)}"):
                 what = f"{robot or 'the robot'} is stopped in another network, and not in this one"
                 report(f"{self._reporter}: {path}: {what}")
-        by = min(found - {""}, key=lambda by: (by == UNREADABLE, by), default="")
+        setters = [by for by in found if by is not None]
+        by = min(setters, key=lambda by: (by == UNREADABLE, by), default=None)
         if found == {by} and by != UNREADABLE:
             self._last[robot] = by
-        return by if by.isprintable() and len(by) < 100 else cut(by)
+        return by if by is None or (by.isprintable() and len(by) < 100) else cut(by)
 
-    def _read(self, path: Path, robot: str) -> str:
+    def _read(self, path: Path, robot: str) -> str | None:
         try:
             return _setter_in(path)
         except FileNotFoundError:
-            return ""
+            return None
         except (OSError, ValueError) as error:
             why = error.strerror if isinstance(error, OSError) else "it is damaged"
             report(
@@ -90,11 +92,11 @@ class StopFiles:
             )
             return UNREADABLE
 
-    def write(self, robot: str, by: str) -> str:
-        """Record who stopped a robot; empty: no one. Returns why that failed and what follows, or
+    def write(self, robot: str, by: str | None) -> str:
+        """Record who stopped a robot; None: no one. Returns why that failed and what follows, or
         "". It is reported too, once: the stop holds all the same.
         """
-        if not by and self._writer is None and self._is_kept(robot, by):
+        if by is None and self._writer is None and self._is_kept(robot, by):
             return ""  # at each spawn of a robot that is not stopped, without the cost of a thread
         with self._lock:
             self._wanted[robot] = by
@@ -105,7 +107,7 @@ class StopFiles:
         writer.join(0 if hangs else HANGS)
         if not writer.is_alive():
             return self._failed.pop(robot, "")
-        reason = f"{self.paths(robot)[0]}: {HUNG if by else HUNG_AT_RELEASE}"
+        reason = f"{self.paths(robot)[0]}: {HUNG_AT_RELEASE if by is None else HUNG}"
         self._report(robot, by, reason)
         return reason
 
@@ -120,7 +122,7 @@ class StopFiles:
             with self._lock:
                 self._failed[robot] = failed
 
-    def _write_files(self, robot: str, by: str) -> str:
+    def _write_files(self, robot: str, by: str | None) -> str:
         """Write all files of a robot. Returns why that failed, or ""."""
         if self._is_kept(robot, by):
             return ""
@@ -135,18 +137,19 @@ class StopFiles:
             "stops hold, but not beyond the end of this process",
             "the next one has the robot stopped",
         )
-        reason = f"{failures[0]}: {lost if by else left}"
+        reason = f"{failures[0]}: {left if by is None else lost}"
         self._report(robot, by, reason)
         return reason
 
-    def _is_kept(self, robot: str, by: str) -> bool:
-        return self._last.get(robot) == by and all(
-            os.path.exists(path) == bool(by) for path in self.paths(robot)
-        )
+    def _is_kept(self, robot: str, by: str | None) -> bool:
+        if robot not in self._last or self._last[robot] != by:
+            return False
+        return all(os.path.exists(path) == (by is not None) for path in self.paths(robot))
 
-    def _report(self, robot: str, by: str, reason: str) -> None:
-        if (robot, bool(by)) not in self._reported:
-            self._reported.add((robot, bool(by)))
+    def _report(self, robot: str, by: str | None, reason: str) -> None:
+        what = (robot, by is not None)
+        if what not in self._reported:
+            self._reported.add(what)
             report(f"{self._reporter}: {reason}")
 
     def forget(self, robot: str) -> None:
@@ -164,13 +167,13 @@ def _file(robot: str) -> str:
     return f"{quote(robot, safe='') or '@'}.stop"
 
 
-def _written(path: Path, by: str) -> str:
+def _written(path: Path, by: str | None) -> str:
     """Write a file, or without `by` remove it. Returns why that failed, or ""."""
     try:
-        if by:
-            _replace(path, by)
-        else:
+        if by is None:
             path.unlink(missing_ok=True)
+        else:
+            _replace(path, by)
     except OSError as error:
         return f"{path}: {error.strerror}"
     return ""

@@ -24,10 +24,12 @@ RELEASED = (
 
 
 class RobotServices:
-    """Serves stop, release and resume in the namespace of the key `command`, for all `arbiters`
-    together. `changed` is called with the time (s) before a stop or a release is confirmed, also
-    for a stop of a robot that is stopped; it returns what the caller should know, or "". Reports
-    begin with `reporter`.
+    """Serves stop, release and resume in the namespace of the key `command`. Each is for all
+    `arbiters` together.
+
+    Before a stop or a release is confirmed, also a stop that changes nothing, `changed` is called
+    with the time (s). It returns what the caller should know besides, or "". Reports begin with
+    `reporter`.
     """
 
     VERBS = ("release", "resume", "stop")
@@ -100,7 +102,7 @@ class RobotServices:
         problem = (
             f"; the request cannot be read: {self._stop.problem}" if self._stop.problem else ""
         )
-        return TriggerReply(True, f"stopped by {self._setter}{problem}{self._change()}")
+        return TriggerReply(True, f"stopped by {self._setter}{problem}{self._apply_change()}")
 
     def _on_release(self, _request: TriggerRequest) -> TriggerReply:
         if not self._setter:
@@ -113,7 +115,7 @@ class RobotServices:
             arbiter.release(self._now)
         self._report(f"was released by {self._release.caller or 'an unknown caller'}")
         return TriggerReply(
-            True, f"{RELEASED.format(resume=resume_command(self._namespace))}{self._change()}"
+            True, f"{RELEASED.format(resume=resume_command(self._namespace))}{self._apply_change()}"
         )
 
     def _on_resume(self, _request: TriggerRequest) -> TriggerReply:
@@ -139,6 +141,7 @@ class RobotServices:
     def _report(self, what: str) -> None:
         report(f"{self._reporter}: {self._namespace or 'the robot'} {what}")
 
-    def _change(self) -> str:
+    def _apply_change(self) -> str:
+        """Let the robot act on the change. Returns the end of the reply."""
         warning = self._changed(self._now)
         return f"; {warning}" if warning else ""

@@ -10,7 +10,9 @@ DISTRUST = 0.1  # s after a stall in which the network's buffers may still bring
 
 
 class ReadTimes:
-    """When commands were last read, the first time at `now` (s)."""
+    """Tells since when the commands that wait may have arrived, by the times at which commands were
+    read. Reading begins at `now` (s).
+    """
 
     def __init__(self, now: float) -> None:
         self._last = self._before_stall = now

@@ -38,12 +38,14 @@ class CommandStatus(Message):
     `obeyed` is the driving source (empty: none), `priority` its Zenoh priority. `held` is true
     after a source of higher priority took over: lower ones wait for a call of `resume`. `resumed`
     counts these calls; `accepted` and `refused` (by reason; pairs in ROS) count commands since the
-    start of the sim. `stopped` names the node that set the software stop (empty: none); `sources`
-    are those with recent commands. `name` is the robot's in the sim. Commands beyond `max_linear`
-    (m/s) and `max_angular` (rad/s) are clamped (0: not known); `strafes` is whether its drive can
-    move it sideways. `commanded` is the velocity that it obeys, clamped so and before the limits of
-    its file; zero if none drives it. `time_before_collision` (s) is that of its collision monitor,
-    0 while that is off; `limited` is how it limits `commanded` now, and why (empty: it does not).
+    start of the sim, `clamped` those of the accepted that were over the limits. `stopped` names the
+    node that set the software stop (empty: none); `sources` are those with recent commands. `name`
+    is the robot's in the sim. Commands beyond `max_linear` (m/s) and `max_angular` (rad/s) are
+    clamped (0: not known); `strafes` is whether its drive can move it sideways. `commanded` is the
+    velocity that it obeys, clamped so and before the limits of its file; zero if none drives it.
+    `time_before_collision` (s) is that of its collision monitor, 0 while that is off; `limited` is
+    how it limits `commanded` now, and why (empty: it does not). `last_refusal` and `last_clamped`
+    are the source and the reason of the last of each.
     """
 
     obeyed: str = ""
@@ -64,6 +66,8 @@ class CommandStatus(Message):
     commanded: Twist = field(default_factory=Twist)
     time_before_collision: float = 0.0
     limited: str = ""
+    clamped: UInt64 = 0
+    last_clamped: str = ""
 
 
 class SimulationStatus(Message):

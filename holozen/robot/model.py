@@ -243,12 +243,12 @@ class Drive(Struct, frozen=True):
 
     All defaults except the timeout are those of Gazebo's planar_move. Topics include their
     namespace and have no leading slash. `odometry_rate` in Hz of sim time. `robot_base_frame` names
-    a link, the child frame of odometry. `command_timeout` in seconds; -1 disables it. `covariance`
-    is the variance of x and y in m^2 and of yaw in rad^2. Odometry is the pose in the world, or
-    with `odometry_from_start` relative to where the robot started; `odometry_noise` is the standard
-    deviation of the noise on x, y, yaw and their rates, in m, rad, m/s and rad/s. The limits are
-    those of the file, in m/s, rad/s, m/s^2 and rad/s^2. The robot slows down for what its lidars
-    see `time_before_collision` s ahead; 0: it does not.
+    a link, the child frame of odometry. `command_timeout` in seconds; None disables it.
+    `covariance` is the variance of x and y in m^2 and of yaw in rad^2. Odometry is the pose in the
+    world, or with `odometry_from_start` relative to where the robot started; `odometry_noise` is
+    the standard deviation of the noise on x, y, yaw and their rates, in m, rad, m/s and rad/s. The
+    limits are those of the file, in m/s, rad/s, m/s^2 and rad/s^2. The robot slows down for what
+    its lidars see `time_before_collision` s ahead; 0: it does not.
     """
 
     command_topic: str = "cmd_vel"
@@ -256,7 +256,7 @@ class Drive(Struct, frozen=True):
     odometry_frame: str = "odom"
     odometry_rate: float = 20.0
     robot_base_frame: str = ""
-    command_timeout: float = COMMAND_SILENCE
+    command_timeout: float | None = COMMAND_SILENCE
     publish_odom: bool = True
     publish_odom_tf: bool = True
     covariance: tuple[float, float, float] = (1e-5, 1e-5, 1e-3)

@@ -127,9 +127,9 @@ class Beat(Declared):
             self._put(b"%d" % now)
 
 
-class Heard:
-    """What is heard of one receiver: `newest`, the last beat in its ns, and `text`, its echo; 0 and
-    empty before the first. `users`: the Echoes that watch it.
+class Receiver:
+    """Who obeys commands, by what was heard of it: `newest`, its last beat in its own ns, and
+    `text`, what to echo of that; 0 and empty before the first. `users`: the Echoes that watch it.
     """
 
     __slots__ = ("_answers", "_beats", "_name", "_subscriber", "newest", "text", "users")
@@ -181,7 +181,7 @@ class Hearing(Declared):
     ) -> None:
         super().__init__(tokens)
         self._name, self._tokens, self._hear, self._call = name, tokens.handler.try_recv, hear, call
-        self._heard: dict[str, Heard] = {}
+        self._receivers: dict[str, Receiver] = {}
         # the sessions that announce a beat -> how many tokens they hold for that
         self.beating: dict[str, int] = {}
         self.turn = 0  # how often these have changed
@@ -202,28 +202,30 @@ class Hearing(Declared):
         with self.unless_closed():
             self._call(timeout)
 
-    def watch(self, receiver: str) -> Heard:
+    def watch(self, receiver: str) -> Receiver:
         """Hear a receiver until `unwatch`."""
-        if receiver not in self._heard:
-            self._heard[receiver] = Heard(receiver, *self._hear(beat_key(receiver, self._name)))
-        heard = self._heard[receiver]
+        if receiver not in self._receivers:
+            self._receivers[receiver] = Receiver(
+                receiver, *self._hear(beat_key(receiver, self._name))
+            )
+        heard = self._receivers[receiver]
         heard.users += 1
         return heard
 
     def unwatch(self, receiver: str) -> None:
         """Hear a receiver no longer, if nobody else watches it."""
-        if not (heard := self._heard.get(receiver)):  # the bus is closed
+        if not (heard := self._receivers.get(receiver)):  # the bus is closed
             return
         heard.users -= 1
         if not heard.users:
-            del self._heard[receiver]
+            del self._receivers[receiver]
             heard.close()
 
     def close(self) -> None:
         """Hear nobody."""
         super().close()
         with self.lock:
-            heard, self._heard = self._heard, {}
+            heard, self._receivers = self._receivers, {}
         for each in heard.values():
             each.close()
 
@@ -252,12 +254,12 @@ class Echoes(Declared):
         super().__init__(tokens)
         self.key, self._hearing, self._tokens = key, hearing, tokens.handler.try_recv
         self._holders: dict[str, set[str]] = {}  # the tokens of each session
-        self._watched: dict[str, Heard] = {}
+        self._watched: dict[str, Receiver] = {}
         self._vouched: dict[str, int] = {}  # what was echoed last by `vouched`
         self.was_heard = False  # whether any was heard when the last command was sent
         self._turn = 0  # of `hearing`, when it was last looked at
         self._is_settled = False
-        self._waits_since = 0.0  # s, monotonic; 0: it does not wait
+        self._waits_since: float | None = None  # s, monotonic; None: it does not wait
         self._has_reported = False
 
     def attached(self, waited: float = 0.0) -> bytes:
@@ -272,7 +274,7 @@ class Echoes(Declared):
                 self.was_heard = bool(text)
                 return text
             heard = [
-                (session, heard.newest - int(waited * 1e9)) for session, heard in self._heard()
+                (session, heard.newest - int(waited * 1e9)) for session, heard in self._beating()
             ]
             self.was_heard = bool(heard)
         return b",".join(b"%b:%d" % (session.encode(), max(ns, 0)) for session, ns in heard)
@@ -291,7 +293,7 @@ class Echoes(Declared):
         """The newest beat of each receiver, taken now: its session, and its own time in ns."""
         with self._hearing.lock:
             self._look()
-            return tuple((session, heard.newest) for session, heard in self._heard())
+            return tuple((session, heard.newest) for session, heard in self._beating())
 
     @property
     def has_receiver(self) -> bool:
@@ -312,7 +314,7 @@ class Echoes(Declared):
         """
         with self._hearing.lock:
             self._look()
-            is_waiting = self._watched and not self._heard()
+            is_waiting = self._watched and not self._beating()
             return listed(session[:6] for session in self._watched) if is_waiting else ""
 
     def settle(self, timeout: float = SETTLE) -> None:
@@ -335,10 +337,11 @@ class Echoes(Declared):
         """
         self.settle()
         if not self.awaited:
-            self._waits_since, self._has_reported = 0.0, False
+            self._waits_since, self._has_reported = None, False
             return True
         now = time.monotonic()
-        self._waits_since = self._waits_since or now
+        if self._waits_since is None:
+            self._waits_since = now
         if not self._has_reported and now - self._waits_since > NOTICE:
             self._has_reported = True
             report(WAITING.format(key=self.key))
@@ -351,7 +354,7 @@ class Echoes(Declared):
             for session in [*self._watched]:
                 self._drop(session)
 
-    def _heard(self) -> list[tuple[str, Heard]]:
+    def _beating(self) -> list[tuple[str, Receiver]]:
         return [(session, heard) for session, heard in self._watched.items() if heard.text][
             :MAX_ECHOES
         ]

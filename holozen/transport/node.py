@@ -179,8 +179,8 @@ class Node:
         return source(self._signer, self.id)
 
     @cached_property
-    def heard(self) -> dict[str, int]:
-        """The times (ns) that replies held of their servers' sessions, the newest last."""
+    def server_times(self) -> dict[str, int]:
+        """Server's session -> its own time (ns) in its last reply, the newest reply last."""
         return {}
 
     @property

@@ -464,7 +464,8 @@ def call_bytes(
     """As `call`, without types: the samples of the replies. All attempts have one number, so a
     service applies the request once.
     """
-    attempts, deadline = RepeatedRequest(time.monotonic(), node.heard), time.monotonic() + timeout
+    now = time.monotonic()
+    attempts, deadline = RepeatedRequest(now, node.server_times), now + timeout
     pause, refused = FIRST_PAUSE, None
     while (left := deadline - time.monotonic()) > 0:
         found, again = [], False
@@ -472,7 +473,7 @@ def call_bytes(
         for answer in ask(key, left, number=attempts.number, payload=payload, encoding=encoding):
             if isinstance(answer, Sample):
                 found.append(answer)
-                _hear(node.heard, answer)
+                _hear(node.server_times, answer)
                 if not everyone:
                     return found
             elif answer != TIMEOUT:

@@ -166,8 +166,8 @@ class Follower:
     ) -> None:
         self._bus, self._stop, self._report = bus, stop, report
         self.gains = gains
-        self._odom = RobotFeedback(bus, key_for("odom", robot))
         self.status = bus.latest(key_for("cmd_vel_status", robot), CommandStatus)
+        self._odom = RobotFeedback(bus, key_for("odom", robot), self.status)
         self._commands: Publisher[Twist] = bus.publisher(
             key_for("cmd_vel", robot), Twist, PRIORITY_OF["controller"]
         )
@@ -209,13 +209,13 @@ class Follower:
         """Stop the robot if this controller moves it: zeros until odom shows rest, for at most a
         second.
         """
-        ends = time.monotonic() + STOP_FOR
+        since = time.monotonic()
         while self._now != STOP:
-            count, since = self._odom.count, time.monotonic()
+            count = self._odom.count
             self._commands.put(Twist())
             self._odom.wait(count, STOP_EVERY)
             self._beat.poll()
-            if time.monotonic() > ends or self._odom.rests(since):
+            if time.monotonic() - since > STOP_FOR or self._odom.rests(since):
                 self._now = STOP
 
     def close(self) -> None:

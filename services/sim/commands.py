@@ -18,10 +18,9 @@ from holozen.command.motion import is_stop
 from holozen.command.stop_services import RobotServices
 from holozen.command.wait_set import Reader
 from holozen.messages import CommandStatus, JointState, Twist, TwistStamped, Wrench
-from holozen.robot.model import Drive
 from holozen.suggest import listed
 from holozen.transport.pubsub import Subscription
-from holozen.wire import COMMAND_SILENCE, MAX_COMMAND_BYTES, key_for
+from holozen.wire import COMMAND_SILENCE, MAX_COMMAND_AGE, MAX_COMMAND_BYTES, key_for
 
 from .actuators import Actuators
 from .identity import Identity
@@ -44,7 +43,7 @@ class CommandRules(Struct):
     senders: Senders
     linear: float
     angular: float
-    max_age: float = COMMAND_SILENCE
+    max_age: float = MAX_COMMAND_AGE
     time: CommandTime = field(default_factory=CommandTime)
     reports: ReportLimit = field(default_factory=ReportLimit)
 
@@ -125,8 +124,12 @@ class Commands:
         self._rules = rules
         self._of_members = bus.member is not None
         drive, namespace = identity.model.drive, identity.namespace
-        timeouts = (_timeout(drive), COMMAND_SILENCE, COMMAND_SILENCE)
-        self.arbiters = Arbiters(*(Arbiter(timeout, rules.time, namespace) for timeout in timeouts))
+        timeout = drive.command_timeout if drive else COMMAND_SILENCE
+        self.arbiters = Arbiters(
+            base=Arbiter(timeout, rules.time, namespace),
+            joints=Arbiter(time=rules.time, robot=namespace),
+            disturbances=Arbiter(time=rules.time, robot=namespace),
+        )
         only_disturb = identity.drives and not actuators.base_is_pushed
         self.forces = self.arbiters.disturbances if only_disturb else self.arbiters.base
 
@@ -196,11 +199,3 @@ class Commands:
         for subscription in self._subscriptions:
             subscription.close()
         self._services.close()
-
-
-def _timeout(drive: Drive | None) -> float | None:
-    """The silence in s after which a robot stops; None if its file has the watchdog off, by a time
-    below zero.
-    """
-    timeout = drive.command_timeout if drive else COMMAND_SILENCE
-    return timeout if timeout >= 0 else None

@@ -54,7 +54,8 @@ class Loop:
         self.answers: list[Callable[[], bool]] = []
         # called at each pass, and last before each step
         self.safeguard: Callable[[float], None] = lambda _now: None
-        self._served = self._polled = 0.0
+        # s; when the `answers` were called, and when requests of robots were read, 0 before
+        self._served_at = self._polled_at = 0.0
         self._answered_at: float | None = None  # s; the last time that a request was answered
         self._clock = bus.publisher("clock", Clock) if is_clock else None
         self._clock_due = Schedule(CLOCK_RATE)
@@ -67,14 +68,14 @@ class Loop:
         self._marks: deque[tuple[float, float]] = deque()  # real and sim time of past statuses
         self.simulation = Simulation(world, entities, self.pace, self.publish_all)
         self._reads = ReadTimes(time.monotonic())
-        self._reads_at = 0.0
+        self._read_due = 0.0
 
     def run(self, stop: threading.Event, steps: int | None = None) -> None:
         """Step until `stop` is set, or for a number of `steps`."""
         pace = self.pace
         pace.set_factor(pace.rtf, time.monotonic())
         last = None if steps is None else self._world.steps + steps
-        self._reads_at = 0.0
+        self._read_due = 0.0
         while not stop.is_set() and self._world.steps != last:
             now = time.monotonic()
             self.safeguard(now)
@@ -160,23 +161,23 @@ class Loop:
             self._reported, self._report_due = pace.overruns, now + REPORT_EVERY
 
     def _read_inputs(self, now: float) -> None:
-        if now < self._reads_at:
+        if now < self._read_due:
             return
         steps = self.simulation.steps
         is_asked = steps is not None and not steps.may_begin
         since = self._reads.since(now)
         moment = Moment(now, since, (time.time(), self._world.time))
         self._fleet.read_commands(moment)
-        if is_asked or now - self._polled >= POLL:
-            self._fleet.read_requests(moment._replace(since=min(since, self._polled or since)))
-            self._polled = now
+        if is_asked or now - self._polled_at >= POLL:
+            self._fleet.read_requests(moment._replace(since=min(since, self._polled_at or since)))
+            self._polled_at = now
         if steps:
             steps.may_begin = True  # all commands sent before the request have been read
-        if now - self._served >= self._until_served(now):
+        if now - self._served_at >= self._until_served(now):
             if sum(answer() for answer in self.answers):  # calls them all, unlike any()
                 self._answered_at = now
-            self._served = now
-        self._reads_at = now + min(READ_EVERY, self._until_served(now))
+            self._served_at = now
+        self._read_due = now + min(READ_EVERY, self._until_served(now))
 
     def _step(self, now: float) -> None:
         world, dt = self._world, self._world.spec.step

@@ -71,8 +71,8 @@ def _of_robot(fleet: Fleet, robot: Robot) -> Iterator[Number]:
         "the robot stops after this long without a command",
         "s",
         *TIMEOUTS,
-        lambda: OFF if arbiter.timeout is None else arbiter.timeout,
-        lambda value: arbiter.set_timeout(value, time.monotonic()),
+        lambda: OFF if (timeout := arbiter.velocity_timeout) is None else timeout,
+        lambda value: arbiter.set_velocity_timeout(value, time.monotonic()),
     )
     yield Number(
         f"{place}odometry_rate",

@@ -35,8 +35,8 @@ class StopMemory:
         if before:
             arbiters.inherit(before, now)
         self._last[wire_name] = arbiters
-        setter = self.files.read(wire_name) if self.files else ""
-        if setter:
+        setter = self.files.read(wire_name) if self.files else None
+        if setter is not None:
             arbiters.stop(setter, now)
         self.keep(wire_name)
         if arbiters.stopped_by:
@@ -71,4 +71,4 @@ class StopMemory:
     def keep(self, wire_name: str) -> str:
         """Write to its file who stopped a robot. Returns why it is not kept, or ""."""
         setter = self._last[wire_name].stopped_by
-        return self.files.write(wire_name, setter or "") if self.files else ""
+        return self.files.write(wire_name, setter) if self.files else ""

@@ -46,7 +46,7 @@ class Telemetry:
         self._odometry_due = Schedule(model.drive.odometry_rate if model.drive else 0.0, phase)
         self._joints = JointTopics(bus, identity, actuators.mover.names, self._tf)
         self._joints_due = Schedule(JOINT_RATE, phase)
-        self._demand_checked_again = 0.0  # s of sim time; until then no one reads the joints
+        self._joint_demand_due = 0.0  # s of sim time; when to look again whether anyone reads them
         self._sensors: SensorTopics | None = None
         if model.sensors:
             self._sensors = SensorTopics(bus, identity, around, phase, monitor)
@@ -60,7 +60,7 @@ class Telemetry:
 
     def reset(self) -> None:
         """The world was reset: what it publishes is due at once."""
-        self._demand_checked_again = 0.0
+        self._joint_demand_due = 0.0
         if self._sensors:
             self._sensors.reset()
 
@@ -72,7 +72,7 @@ class Telemetry:
     def set_odometry_rate(self, rate: float) -> None:
         """Set the rate of odometry in Hz of sim time. It is due at once."""
         self._odometry_due.set_rate(rate)
-        self._demand_checked_again = 0.0
+        self._joint_demand_due = 0.0
 
     def publish_status(self, status: CommandStatus) -> None:
         """Publish the command status, if there is a drive."""
@@ -88,7 +88,7 @@ class Telemetry:
         when anything is due again. Raises ValueError if its position is not finite.
         """
         is_odometry_due = self._odometry_due.advance(time)
-        are_joints_due = time >= self._demand_checked_again and self._joints_due.advance(time)
+        are_joints_due = time >= self._joint_demand_due and self._joints_due.advance(time)
         if self._sensors and time >= self._sensors.next:
             self._sensors.publish(Step(time, round(time / dt)), self._actuators.link_states)
         self._queue(time, dt, is_odometry_due, are_joints_due)
@@ -105,7 +105,7 @@ class Telemetry:
         return self._next()
 
     def _next(self) -> float:
-        joints = max(self._joints_due.next, self._demand_checked_again)
+        joints = max(self._joints_due.next, self._joint_demand_due)
         sensors = self._sensors.next if self._sensors else math.inf
         return min(self._odometry_due.next, joints, sensors)
 
@@ -114,7 +114,7 @@ class Telemetry:
         drive = self._drive if odometry else None
         wanted = drive.poll_wanted() if drive else NOTHING
         if joints and not self._joints.poll_wanted():
-            joints, self._demand_checked_again = False, time + DEMAND_CHECK
+            joints, self._joint_demand_due = False, time + DEMAND_CHECK
         mover = self._actuators.mover
         if mover.body.glides and not joints and wanted == NOTHING:
             return  # it has neither encoders nor wheels that have to be kept up to date

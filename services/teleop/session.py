@@ -50,10 +50,10 @@ class RobotClient:
         assert self._commands.echoes
         self._echoes = self._commands.echoes
         self._echoes.settle(0.0)  # a key waits for no beat
-        self.odom = RobotFeedback(bus, self.beside("odom"))
         self.status_key = f"{self.key}_status"
         self.name = ""  # in the sim; empty while it is not known
         self._status = bus.latest(self.status_key, CommandStatus)
+        self.odom = RobotFeedback(bus, self.beside("odom"), self._status)
 
     def beside(self, name: str) -> str:
         """The robot's key with this name, beside its command key."""
@@ -128,7 +128,7 @@ class Session:
         self._had_odom = False  # at the last tick
         self.due = 0.0  # when the command is to be repeated
         # the action that waits until the robot is at rest: "resume" or "next_robot"
-        self._pending = ""
+        self._pending: str | None = None
 
     def take(self, event: Event, now: float) -> str:
         """Take an event, and publish any change at once. Returns "quit" or "suspend" if it requests
@@ -142,7 +142,7 @@ class Session:
         if key.kind in ("press", "typed"):
             if self._is_switching() and FIXED.get(self.mapper.key(key)) not in ("quit", "suspend"):
                 return self.let_go(SWITCHING)
-            self.warning, self._pending = "", ""
+            self.warning, self._pending = "", None
         return self.act(self.mapper.take(key, now), now)
 
     def disregard(self, key: Key, now: float) -> None:
@@ -174,7 +174,7 @@ class Session:
         if stick != self.mapper.stick:
             # as a key does: an operator who steers has not handed over
             if self._pending == "resume":
-                self._pending = ""
+                self._pending = None
             self.mapper.steer(stick, now)
             self.publish(now)
 
@@ -250,7 +250,7 @@ class Session:
         return self._pending == "next_robot"
 
     def _do_pending(self) -> None:
-        pending, self._pending = self._pending, ""
+        pending, self._pending = self._pending, None
         if pending == "resume":
             return self._hand_over()
         ring = self.ring()

@@ -7,6 +7,7 @@ from collections import deque
 
 from holozen.limits import STOP, Planar
 from holozen.messages import CommandStatus, Odometry, Twist
+from holozen.odometry import round_trip
 
 from .control.twist_mapper import DEAD_MAN
 from .session import Session
@@ -99,7 +100,7 @@ class Telemetry:
             measured=_planar(odom.twist.twist) if odom else STOP,
             odom_age=age,
             stale=client.odom.is_stale,
-            round_trip=_round_trip(status, session.bus.source),
+            round_trip=round_trip(status, session.bus.source) or None,
             real_time_factor=self._track.real_time_factor(),
             pose=self._track.pose,
             trail=self._track.trail,
@@ -126,15 +127,6 @@ class Telemetry:
                 Source(s.source, s.priority, s.rate, s.obeyed, s.held) for s in status.sources
             ],
         )
-
-
-def _round_trip(status: CommandStatus, source: str) -> float | None:
-    """Seconds from the beat that our last command returned until it was read: the way here and
-    back, and up to 50 ms between two beats. None before the first command.
-    """
-    return next(
-        (one.delay for one in status.sources if one.source == source and one.delay > 0), None
-    )
 
 
 def _unmoved(session: Session, status: CommandStatus) -> str:

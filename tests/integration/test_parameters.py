@@ -71,7 +71,7 @@ def test_a_lower_limit_applies_at_the_next_command(robot: Robot) -> None:
     reason = "over the limits of 0.2 m/s"
     robot.drive(
         x=0.5,
-        until=lambda odom: moves(odom, 0.2, 0, 0) and reason in robot.last_status().last_refusal,
+        until=lambda odom: moves(odom, 0.2, 0, 0) and reason in robot.last_status().last_clamped,
     )
 
 

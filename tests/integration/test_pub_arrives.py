@@ -369,7 +369,7 @@ def test_any_type_is_published_with_its_fields(verb: Verb, town: Wire) -> None:
 
 
 def test_lost_samples_are_counted_by_the_publishers_numbers(town: Wire) -> None:
-    """A publisher of ours that loses five samples after each, while Zenoh drops none."""
+    """A publisher of ours loses five samples after each; Zenoh itself drops none."""
     bus = town.bus("ours")
     publisher, skip = bus.publisher("holes", Twist, block=True), bus.stamps("holes")
     hz = town.start("topic", "hz", "holes", "--json")

@@ -176,13 +176,13 @@ def test_a_source_cannot_write_on_the_terminal_through_its_name(wire: Wire) -> N
 
 def test_over_the_limit_is_clamped_in_the_same_direction_and_reported(robot: Robot) -> None:
     before, reason = (
-        robot.status().refused.get("clamped", 0),
+        robot.status().clamped,
         "over the limits of 5 m/s and 10 rad/s, clamped",
     )
 
     def clamped(odom: Odometry) -> bool:
         status = robot.last_status()
-        counted = status.refused.get("clamped", 0) > before and reason in status.last_refusal
+        counted = status.clamped > before and reason in status.last_clamped
         return counted and moves(odom, 3, 4, 0, tolerance=0.01)
 
     robot.drive(30.0, 40.0, until=clamped)

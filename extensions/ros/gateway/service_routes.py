@@ -23,7 +23,7 @@ from holozen.transport.samples import Answers, Sample
 from holozen.transport.services import MAX_REQUEST_BYTES, RING, call_bytes, frees, refuse
 
 LATE = (
-    f"it was sent more than {wire.COMMAND_SILENCE:g} s from this machine's clock: it is late, and "
+    f"it was sent more than {wire.MAX_COMMAND_AGE:g} s from this machine's clock: it is late, and "
     "has to be sent again,"
     " or the clocks differ: set them, or use `holozen release`, `controller --resume`, `sim play` "
     "or `action send_goal`"
@@ -92,7 +92,7 @@ class ServiceRoutes:
         attachment, stamp = (self._sides.form.answered(asked), rmw.attachment(asked))
         request = f"application/cdr;{interface.request.name}"
         try:
-            is_late = stamp and abs(time.time() - stamp.sent / 1e9) > wire.COMMAND_SILENCE
+            is_late = stamp and abs(time.time() - stamp.sent / 1e9) > wire.MAX_COMMAND_AGE
             payload = bytes(query.payload or b"")
             if is_late and frees(found.topic, payload, request):
                 raise ServiceError(LATE)

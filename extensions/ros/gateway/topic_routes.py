@@ -17,9 +17,9 @@ from holozen.transport import graph as graphs
 from holozen.transport.samples import Numbers, Sample, stamps
 
 JITTER = 0.1  # s; the time under way that counts as none: what several nodes send stays in order
-UNDER_WAY = f"a command was under way for more than {wire.COMMAND_SILENCE:g} s"
+UNDER_WAY = f"a command was under way for more than {wire.MAX_COMMAND_AGE:g} s"
 UNKNOWN_AGE = (
-    f"a first command has a time of sending more than {wire.COMMAND_SILENCE:g} s from this "
+    f"a first command has a time of sending more than {wire.MAX_COMMAND_AGE:g} s from this "
     "machine's clock; it is late,"
     f" or the clocks differ: set them, or go on publishing, and after {rmw.PACE:g} s commands are "
     "forwarded"
@@ -162,7 +162,7 @@ class TopicRoutes:
                 return
             age = measured.of(stamp, time.monotonic(), time.time())
             if not self._stops(theirs.type, sample.payload):
-                if age > wire.COMMAND_SILENCE:
+                if age > wire.MAX_COMMAND_AGE:
                     self._sides.refuse(key, UNDER_WAY if measured.kept_pace else UNKNOWN_AGE)
                     return
                 if not echoes.may_command():

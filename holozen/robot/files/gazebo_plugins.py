@@ -6,7 +6,9 @@ A plugin is identified by its file name, or for gz-sim by its class.
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from functools import cache
+from pathlib import Path
 
 from msgspec.structs import replace
 
@@ -20,11 +22,13 @@ from holozen.robot.model import (
     Drive,
     Force,
     Joint,
+    Limits,
     Link,
     Mecanum,
     Mechanism,
     Omni,
     Planar,
+    Pose,
     Pushed,
     RobotModel,
     Sensor,
@@ -78,10 +82,16 @@ _KEY = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(/[A-Za-z0-9_][A-Za-z0-9_-]*)*")
 
 
 class Settings:
-    """The child elements of `owner` by their ROS 2 spelling; the first of duplicates counts."""
+    """The child elements of `owner` by their ROS 2 spelling; the first of duplicates counts.
+
+    Attributes:
+        owner: The element that has them.
+        asked: The names that a reader asked for, whether the file gives them or not.
+    """
 
     def __init__(self, owner: Tag) -> None:
         self.owner = owner
+        self.asked: set[str] = set()
         self._tags = {_snake_case(tag.name): tag for tag in reversed(owner.children)}
         # those that were asked for, by the names that a remapping may give
         self._topics: set[str] = set()
@@ -92,6 +102,7 @@ class Settings:
 
     def each(self, *names: str) -> list[Tag]:
         """Every non-empty child called one of `names`, in file order."""
+        self.asked.update(names)
         return [
             tag for tag in self.owner.children if _snake_case(tag.name) in names and tag.value()
         ]
@@ -127,14 +138,14 @@ class Settings:
             )
         return value
 
-    def timeout(self, *names: str) -> float:
-        """Seconds, or -1 for a disabled watchdog. Raises RobotError."""
+    def timeout(self, *names: str) -> float | None:
+        """Seconds; None for a watchdog that is disabled, by a negative number. Raises
+        RobotError.
+        """
         value = number(self.word(*names))
-        return (
-            -1.0
-            if value is not None and value < 0
-            else self.number(COMMAND_SILENCE, *names, zero=False)
-        )
+        if value is not None and value < 0:
+            return None
+        return self.number(COMMAND_SILENCE, *names, zero=False)
 
     def flag(self, *names: str, default: bool = True) -> bool:
         """True, false, 1 or 0; `default` if not set. Raises RobotError."""
@@ -197,7 +208,17 @@ class Settings:
                     f"{listed(known)}",
                 )
 
+    def warn_unread(self, source: Source, known: Container[str]) -> None:
+        """Warn of each element that the reader of this plugin did not ask for, though it is one of
+        those `known`, which mean something in other plugins.
+        """
+        plugin = file_name(kind_of(self.owner))
+        for name, tag in reversed(self._tags.items()):
+            if name in known and name not in self.asked and tag.value():
+                source.warn(tag, f"changes nothing: {plugin} does not read it, as others do")
+
     def _found(self, names: tuple[str, ...]) -> Tag | None:
+        self.asked.update(names)
         return next(
             (self._tags[name] for name in names if name in self._tags and self._tags[name].value()),
             None,
@@ -393,7 +414,7 @@ def planar_move(settings: Settings, joints: Joints, source: Source) -> Drive:
     return _ros_drive(settings, Planar(settings.number(PLANAR.update_rate, "update_rate")))
 
 
-def omni_drive(settings: Settings) -> Drive:
+def omni_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
     """holozen's own: the robot's own wheels, with free rollers on their rims. Its tags are those of
     planar_move, and odometry_source.
     """
@@ -741,7 +762,7 @@ def _force(plugin: Tag, links: Mapping[str, Link], source: Source) -> Force | No
     if frame not in FRAMES:
         raise settings.tag("force_frame").wrong(f"is {cut(frame)}; it must be world or link")
     topic = settings.topic(FORCE, "topic_name")
-    settings.check_remappings(source, complete=True)
+    _warn_of_unused(settings, source)
     return Force(tag.value(), topic, FRAMES[frame])
 
 
@@ -827,21 +848,25 @@ def read_plugins(
         else:
             settings = Settings(plugin)
             found = DRIVES[kind](settings, joints, source)
-            settings.check_remappings(source, complete=True)
+            _warn_of_unused(settings, source)
             drive, driver = (
                 measured(found, plugin, RobotModel("", root, links, joints, None)),
                 plugin,
             )
     if wheels and drive:
-        drive = _on_wheels(drive, driver, wheels)
+        drive = _on_wheels(drive, driver, wheels, source)
     elif wheels:
-        drive, driver = omni_drive(Settings(wheels)), wheels
+        settings = Settings(wheels)
+        drive, driver = omni_drive(settings, joints, source), wheels
+        _warn_of_unused(settings, source)
     if drive is None:
         _warn_of_no_drive(publishers, source)
         return None
     _warn_of_timeout(drive, Settings(driver), source)
     for plugin in publishers:
-        drive, driver = with_publisher(drive, Settings(plugin)), plugin
+        settings = Settings(plugin)
+        drive, driver = with_publisher(drive, settings), plugin
+        settings.warn_unread(source, drive_tags())
     return _with_known_frame(drive, driver, links, root, source)
 
 
@@ -857,13 +882,46 @@ def _warn_of_no_drive(publishers: list[Tag], source: Source) -> None:
         source.warn(plugin, "publishes odometry, but the robot has no drive")
 
 
-def _on_wheels(drive: Drive, driver: Tag, wheels: Tag) -> Drive:
+def _on_wheels(drive: Drive, driver: Tag, wheels: Tag, source: Source) -> Drive:
     """The drive of planar_move, on the wheels of another plugin."""
     if not isinstance(drive.mechanism, Planar):
         raise wheels.wrong(
             f"is a second drive beside {cut(kind_of(driver))}; use it with planar_move, or alone"
         )
-    return replace(drive, mechanism=omni_drive(Settings(wheels)).mechanism)
+    settings = Settings(wheels)
+    mechanism = Omni(_encoder(settings))
+    _warn_of_unused(settings, source)
+    return replace(drive, mechanism=mechanism)
+
+
+class _AnyJoint(dict[str, Joint]):
+    """Has every joint that a plugin may name."""
+
+    def __contains__(self, name: object) -> bool:
+        return True
+
+    def __missing__(self, name: str) -> Joint:
+        return Joint(name, TURNING[0], "", "", Pose(), (1.0, 0.0, 0.0), Limits())
+
+
+@cache
+def drive_tags() -> frozenset[str]:
+    """Each element, in snake_case, that some drive reads: what their readers ask an empty plugin
+    for.
+    """
+    asked: set[str] = set()
+    for read in (*DRIVES.values(), omni_drive):
+        settings = Settings(Tag("plugin", {}, ""))
+        drive = read(settings, _AnyJoint(), Source(Path(), {}))
+        with_publisher(drive, settings)
+        asked |= settings.asked
+    return frozenset(asked)
+
+
+def _warn_of_unused(settings: Settings, source: Source) -> None:
+    """Warn of remappings and elements that change nothing in a plugin that has been read."""
+    settings.check_remappings(source, complete=True)
+    settings.warn_unread(source, drive_tags())
 
 
 def plugins_outside_sensors(robot: Tag) -> Iterator[Tag]:
@@ -894,9 +952,10 @@ def _warn_not_run(plugin: Tag, kind: str, source: Source) -> None:
 
 
 def _warn_of_timeout(drive: Drive, settings: Settings, source: Source) -> None:
-    if not 0 < drive.command_timeout <= LONG_TIMEOUT:
+    timeout = drive.command_timeout
+    if timeout is None or timeout > LONG_TIMEOUT:
         tag = settings.tag("cmd_timeout", "command_timeout")
-        long = "for ever" if drive.command_timeout < 0 else f"for {drive.command_timeout:g} s"
+        long = "for ever" if timeout is None else f"for {timeout:g} s"
         problem = (
             f"is {cut(tag.value())}: a robot whose driver hangs, or whose link is cut, "
             f"drives on {long}"

@@ -2,7 +2,6 @@
 simulation.
 """
 
-import math
 import time
 from collections.abc import Callable
 from functools import partial
@@ -58,7 +57,7 @@ class SimulationServices:
             bus, "simulate_steps", si.SimulateSteps, lambda _: "", self._begin
         )
         self._goal: Goal | None = None  # of the steps that are being made
-        self._reported = -math.inf  # s; the last feedback
+        self._feedback_due = time.monotonic()  # s
         self._paused_at: float | None = None  # s; the last request to pause or stop
 
     def answer(self) -> bool:
@@ -69,7 +68,7 @@ class SimulationServices:
             begun = True
         if self._goal and self._goal.state is GoalState.CANCELING:
             self._simulation.end_steps("the goal was cancelled")
-        if self._goal and time.monotonic() >= self._reported + FEEDBACK_EVERY:
+        if self._goal and time.monotonic() >= self._feedback_due:
             self._report_progress(self._goal)
         return begun | self._action.answer() | answer_in_turn(self._servers)
 
@@ -137,7 +136,7 @@ class SimulationServices:
     def _report_progress(self, goal: Goal) -> None:
         left = self._simulation.steps.left if self._simulation.steps else 0
         self._action.feedback(goal, si.SimulateStepsFeedback(goal.request.steps - left, left))
-        self._reported = time.monotonic()
+        self._feedback_due = time.monotonic() + FEEDBACK_EVERY
 
     def _ended(self, goal: Goal, reason: str) -> None:
         self._goal = None

@@ -25,10 +25,10 @@ class Repeat:
     def __init__(self) -> None:
         self.first: float | None = None  # s; the measured first delay
         self._gaps: deque[float] = deque(maxlen=LAST)
-        self._key = ""
+        self._key: str | None = None  # the last one; None before the first
         self._at = 0.0  # time of its last event
         self._repeats = 0
-        self._maybe = 0.0  # a gap that is the first delay if repeats follow
+        self._maybe: float | None = None  # a gap that is the first delay if repeats follow
 
     @property
     def every(self) -> float | None:
@@ -43,7 +43,7 @@ class Repeat:
             self._gaps.append(gap)  # a late repeat on a slow line; the next one may be as late
         self._key, self._at = key, now
         if not again:
-            self._repeats, self._maybe = 0, 0.0
+            self._repeats, self._maybe = 0, None
             return False
         self._repeats += 1
         if self._repeats == 1 and gap > MIN_FIRST_DELAY:
@@ -51,7 +51,7 @@ class Repeat:
         elif gap < SLOWEST:
             self._gaps.append(gap)
             if self._maybe and self._repeats >= SURE:
-                self.first, self._maybe = self._maybe, 0.0
+                self.first, self._maybe = self._maybe, None
         return True
 
     def patience(self) -> float:
@@ -83,24 +83,24 @@ class KeyState:
         self.repeat = Repeat()
         self.timeout = timeout
         self._pressed: dict[str, str] = {}  # code -> key
-        self._typed = ""
+        self._typed: str | None = None  # the held key whose release will not be reported
         self._at = 0.0  # when it was typed
         # a typed key, released while it repeats: it counts again only once it is pressed again
-        self._spent = ""
+        self._spent: str | None = None
         # when the spent key was last seen, if it must not count before it is released; else None
         self._ignored_at: float | None = None
 
     @property
     def keys(self) -> tuple[str, ...]:
         """The held keys, in the order of their presses."""
-        return (*self._pressed.values(), *([self._typed] if self._typed else []))
+        return (*self._pressed.values(), *([self._typed] if self._typed is not None else []))
 
     def press(self, key: str, code: str) -> None:
         """Take a press whose release will be reported."""
         if self.mode == LATCH:
             self._pressed, self._typed = {}, key
         else:
-            self._pressed[code], self._typed = key, ""
+            self._pressed[code], self._typed = key, None
 
     def release(self, code: str) -> bool:
         """Take a release; returns whether the key was held."""
@@ -117,7 +117,7 @@ class KeyState:
             return False
         if again and self._spent == key:
             return False
-        self._pressed, self._typed, self._at, self._spent = {}, key, now, ""
+        self._pressed, self._typed, self._at, self._spent = {}, key, now, None
         return True
 
     def interrupt(self, key: str, now: float) -> None:
@@ -125,7 +125,7 @@ class KeyState:
         are new presses.
         """
         self.repeat.see(key, now)
-        self._spent = ""
+        self._spent = None
 
     def ignore(self, key: str, now: float) -> None:
         """Take a typed key that counts only after it has been released for longer than any first
@@ -136,21 +136,22 @@ class KeyState:
 
     def let_go(self) -> None:
         """Release all keys; one that is still down counts again once it is released and pressed."""
-        if self._typed:
+        if self._typed is not None:
             self._spent, self._ignored_at = self._typed, None
-        self._pressed, self._typed = {}, ""
+        self._pressed, self._typed = {}, None
 
     def expire(self, now: float) -> bool:
         """Release a typed key that no longer repeats; returns whether there was one."""
         if now < self.expires:
             return False
-        self._typed = ""
+        self._typed = None
         return True
 
     @property
     def expires(self) -> float:
-        """When a typed key stops counting unless it is typed again."""
-        return math.inf if self.mode == LATCH or not self._typed else self._at + self.patience()
+        """When a typed key stops counting unless it is typed again; infinite if none ever does."""
+        is_lasting = self.mode == LATCH or self._typed is None
+        return math.inf if is_lasting else self._at + self.patience()
 
     def patience(self) -> float:
         """How long a typed key counts after its last event, in seconds."""

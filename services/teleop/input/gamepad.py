@@ -6,6 +6,7 @@ gamepad specification.
 """
 
 import contextlib
+import errno
 import fcntl
 import math
 import os
@@ -46,23 +47,26 @@ GET_AXIS = request(0x40, _ABSINFO.size)  # EVIOCGABS, plus the axis
 
 
 class Device:
-    """An open input device. Every method raises OSError if it is unplugged or not an input
-    device.
+    """An open input device. Every method but `close` raises OSError if it is closed, unplugged or
+    not an input device.
     """
 
     def __init__(self, path: str) -> None:
-        self._number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
+        flags = os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
+        self._descriptor: int | None = os.open(path, flags)  # None once it is closed
         self._rest = b""
 
     def fileno(self) -> int:
-        """The file descriptor; -1 if closed."""
-        return self._number
+        """The file descriptor."""
+        if self._descriptor is None:
+            raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+        return self._descriptor
 
     def close(self) -> None:
         """Close it; may be called repeatedly."""
-        number, self._number = self._number, -1
-        if number >= 0:
-            os.close(number)
+        descriptor, self._descriptor = self._descriptor, None
+        if descriptor is not None:
+            os.close(descriptor)
 
     def name(self) -> str:
         """The manufacturer's name for it."""
@@ -88,7 +92,7 @@ class Device:
     def events(self) -> Iterator[Event]:
         """The pending events, oldest first. Raises EOFError if there will be no more."""
         try:
-            found = os.read(self._number, _AT_ONCE * EVENT.size)
+            found = os.read(self.fileno(), _AT_ONCE * EVENT.size)
         except BlockingIOError:
             return
         if not found:
@@ -101,7 +105,7 @@ class Device:
 
     def _ask(self, number: int, size: int) -> bytes:
         answer = bytearray(size)
-        fcntl.ioctl(self._number, number, answer)
+        fcntl.ioctl(self.fileno(), number, answer)
         return bytes(answer)
 
 

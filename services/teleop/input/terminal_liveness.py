@@ -85,15 +85,20 @@ class Heartbeat:
 
     def __init__(self) -> None:
         self.answers = False  # whether this terminal is known to reply
-        self.lost = False  # whether a reply was overdue, and the terminal is not yet back
         self._asked: deque[float] = deque()  # times of the queries without a reply
-        self._last: float | None = 0.0  # time of the last query; None: the next one is due now
-        self._lost_at = 0.0
+        self._last: float | None = None  # time of the last query; None: the next one is due now
+        # since when a reply is overdue and the terminal not yet back; None while it is there
+        self._lost_since: float | None = None
         self._sent = self._heard = 0  # identity queries, and replies to them
         self._old = 0  # replies that may belong to queries from before there was input again
         # time of the query after there was input again; None before
         self._probed: float | None = None
         self._rounds = 0  # such queries in a row with a reply in time
+
+    @property
+    def lost(self) -> bool:
+        """Whether a reply was overdue, and the terminal is not yet back."""
+        return self._lost_since is not None
 
     def due(self, now: float, drives: bool) -> bool:
         """Whether to send a query now."""
@@ -106,8 +111,8 @@ class Heartbeat:
 
     def _wait(self, drives: bool) -> float:
         """The time from the last query to the next one."""
-        if self.lost and self._last is not None:
-            return max(RETRY, self._last - self._lost_at)
+        if self._lost_since is not None and self._last is not None:
+            return max(RETRY, self._last - self._lost_since)
         return EVERY if drives else IDLE
 
     def asked_terminal(self, times: int = 1) -> None:
@@ -126,7 +131,7 @@ class Heartbeat:
         in_time, self._probed = now - self._probed <= LIMIT, None
         self._rounds = self._rounds + 1 if in_time else 0
         if self._rounds == ROUNDS:
-            self.lost = False
+            self._lost_since = None
             self._asked.clear()
 
     def note_input(self, now: float) -> int:
@@ -154,7 +159,7 @@ class Heartbeat:
             self._lose(now)
 
     def _lose(self, now: float) -> None:
-        self.lost, self._lost_at, self._last = True, now, None
+        self._lost_since, self._last = now, None
         self._probed, self._rounds = None, 0
 
 

@@ -38,7 +38,7 @@ def test_the_reason_is_the_sims() -> None:
         (CommandStatus(refused={"malformed": 1}, last_refusal=f"{ME}: not a Twist"), "not a Twist"),
         (CommandStatus(refused={"malformed": 1}, last_refusal=f"{TELEOP}: not a Twist"), None),
         (
-            CommandStatus(ME, refused={"clamped": 1}, last_refusal=f"{ME}: over the limits of 5"),
+            CommandStatus(ME, clamped=1, last_clamped=f"{ME}: over the limits of 5"),
             "over the limits of 5",
         ),
         (CommandStatus(ME, refused={"malformed": 1}, last_refusal=f"{ME}: not a Twist"), ""),

@@ -243,7 +243,7 @@ def begin(state: State) -> None:
 
 def respawn(state: State) -> None:
     """The robot is deleted, and another one is spawned in its place."""
-    old, limit = state.arbiter, state.arbiter.timeout
+    old, limit = state.arbiter, state.arbiter.velocity_timeout
     old.settle(state.now)
     state.arbiter = type(old)(limit, old.time)
     state.arbiter.inherit(old, state.now)

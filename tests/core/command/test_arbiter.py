@@ -19,7 +19,7 @@ PERSON, SCRIPT, CONTROLLER, BACKGROUND = (
 
 @pytest.fixture
 def arbiter() -> Arbiter:
-    return Arbiter(timeout=0.5)
+    return Arbiter(velocity_timeout=0.5)
 
 
 def offer(
@@ -52,7 +52,7 @@ def test_no_source_outranks_a_person(arbiter: Arbiter) -> None:
 def test_without_a_command_the_robot_stands(arbiter: Arbiter) -> None:
     assert arbiter.motion(0).value == STOP
     assert arbiter.driver(0) is None
-    assert not arbiter.held
+    assert not arbiter.autopilots_wait
 
 
 def test_a_command_is_obeyed_at_once(arbiter: Arbiter) -> None:
@@ -62,7 +62,7 @@ def test_a_command_is_obeyed_at_once(arbiter: Arbiter) -> None:
 
 def test_a_longer_watchdog_does_not_wake_a_command_that_was_over(arbiter: Arbiter) -> None:
     offer(arbiter, "script", SCRIPT, FORWARD, 1.0)
-    arbiter.set_timeout(2.0, now=1.6)
+    arbiter.set_velocity_timeout(2.0, now=1.6)
     assert (arbiter.motion(1.6).value, arbiter.driver(1.6)) == (STOP, None)
     offer(arbiter, "script", SCRIPT, FORWARD, 2.0)
     assert (arbiter.motion(3.9).value, arbiter.motion(4.1).value) == (FORWARD, STOP)
@@ -70,7 +70,7 @@ def test_a_longer_watchdog_does_not_wake_a_command_that_was_over(arbiter: Arbite
 
 def test_a_shorter_watchdog_stops_a_robot_without_fresh_commands(arbiter: Arbiter) -> None:
     offer(arbiter, "script", SCRIPT, FORWARD, 1.0)
-    arbiter.set_timeout(0.1, now=1.05)
+    arbiter.set_velocity_timeout(0.1, now=1.05)
     assert (arbiter.motion(1.09).value, arbiter.motion(1.11).value) == (FORWARD, STOP)
 
 
@@ -217,7 +217,7 @@ def test_a_lower_source_may_not_even_stop_the_robot(arbiter: Arbiter, low: int) 
 
 
 def test_a_held_source_stops_a_robot_whose_driver_has_been_silent() -> None:
-    arbiter = Arbiter(timeout=2.0)
+    arbiter = Arbiter(velocity_timeout=2.0)
     offer(arbiter, "script", SCRIPT, FORWARD, 1.0)
     offer(arbiter, "teleop", PERSON, LEFT, 1.1)
     assert (
@@ -276,7 +276,7 @@ def test_an_overruled_source_does_not_get_the_robot_back_by_waiting(
     for now in (2.0, 60.0, 3600.0):
         assert offer(arbiter, "low", low, FORWARD, now) == HELD
         assert arbiter.motion(now).value == STOP
-    assert arbiter.held
+    assert arbiter.autopilots_wait
 
 
 def test_a_script_that_spoke_while_a_person_drove_is_held_too(arbiter: Arbiter) -> None:
@@ -286,7 +286,7 @@ def test_a_script_that_spoke_while_a_person_drove_is_held_too(arbiter: Arbiter) 
 
 
 def test_what_lets_a_held_source_drive_again_names_the_robot() -> None:
-    arbiter = Arbiter(timeout=0.5, robot="Fred")
+    arbiter = Arbiter(velocity_timeout=0.5, robot="Fred")
     offer(arbiter, "teleop", PERSON, LEFT, 1.0)
     reason = offer(arbiter, "controller", CONTROLLER, FORWARD, 9.0)
     assert reason == HELD.replace("controller", "controller Fred")
@@ -302,7 +302,7 @@ def test_no_autopilot_takes_a_robot_that_others_drove_not_even_a_new_one(
     arbiter: Arbiter, above: int
 ) -> None:
     offer(arbiter, "teleop", above, LEFT, 1.0)
-    assert arbiter.held
+    assert arbiter.autopilots_wait
     assert offer(arbiter, "controller", CONTROLLER, FORWARD, 9.0) == HELD
     assert arbiter.motion(9.0).value == STOP
 
@@ -311,7 +311,7 @@ def test_the_autopilot_itself_may_fall_silent_and_go_on(arbiter: Arbiter) -> Non
     offer(arbiter, "controller", CONTROLLER, FORWARD, 1.0)
     assert offer(arbiter, "controller", CONTROLLER, FORWARD, 9.0) == ""
     assert offer(arbiter, "another controller", CONTROLLER, FORWARD, 19.0) == ""
-    assert not arbiter.held
+    assert not arbiter.autopilots_wait
 
 
 def test_a_source_below_the_autopilot_neither_drives_nor_makes_it_yield(arbiter: Arbiter) -> None:
@@ -321,14 +321,14 @@ def test_a_source_below_the_autopilot_neither_drives_nor_makes_it_yield(arbiter:
         == "overruled: controller drives; it has to stop first"
     )
     assert offer(arbiter, "recorder", BACKGROUND, LEFT, 9.0) == HELD
-    assert not arbiter.held
+    assert not arbiter.autopilots_wait
 
 
 def test_after_resume_a_held_source_drives_again(arbiter: Arbiter) -> None:
     offer(arbiter, "script", SCRIPT, FORWARD, 1.0)
     offer(arbiter, "teleop", PERSON, STOP, 1.1)
     assert arbiter.resume(1.2) == ""
-    assert not arbiter.held
+    assert not arbiter.autopilots_wait
     assert arbiter.resumed == 1
     assert offer(arbiter, "controller", CONTROLLER, FORWARD, 1.3) == ""
     assert offer(arbiter, "script", SCRIPT, LEFT, 1.4) == ""
@@ -359,7 +359,7 @@ def test_it_knows_when_a_source_last_made_others_wait(arbiter: Arbiter) -> None:
     arbiter.stop("person", 2.0)
     arbiter.stop("person", 3.0)
     assert arbiter.taken_at == arbiter.stopped_at == 3.0, "a stop is set, and set again"
-    other = Arbiter(timeout=0.5)
+    other = Arbiter(velocity_timeout=0.5)
     other.inherit(arbiter, 4.0)
     assert other.taken_at == other.stopped_at == 3.0
 
@@ -372,7 +372,7 @@ def test_resume_leaves_an_autopilot_that_drives_at_the_wheel(arbiter: Arbiter) -
 
 
 def test_a_timeout_of_zero_obeys_for_one_moment(arbiter: Arbiter) -> None:
-    arbiter = Arbiter(timeout=0)
+    arbiter = Arbiter(velocity_timeout=0)
     offer(arbiter, "teleop", PERSON, FORWARD, 1.0)
     assert arbiter.motion(1.0).value == FORWARD
     assert arbiter.motion(1.0 + 1e-9).value == STOP
@@ -383,7 +383,7 @@ class TestWithoutATimeout:
 
     @pytest.fixture
     def arbiter(self) -> Arbiter:
-        return Arbiter(timeout=None)
+        return Arbiter(velocity_timeout=None)
 
     def test_a_silent_source_is_obeyed_for_ever(self, arbiter: Arbiter) -> None:
         offer(arbiter, "teleop", PERSON, FORWARD, 1.0)
@@ -436,7 +436,7 @@ def test_a_flood_of_names_holds_its_own_rank_and_no_higher_one_and_frees_no_one(
     for source in ("forged 0", f"forged {MAX_NAMES + 5}", "never heard of"):
         assert offer(arbiter, source, rank, LEFT, 9.0) == HELD
     for now, source in ((9.0, "teleop"), (10.0, "another teleop")):
-        assert not arbiter.holds(source, PERSON, now)
+        assert not arbiter.must_wait(source, PERSON, now)
         assert offer(arbiter, source, PERSON, FORWARD, now) == ""
     assert arbiter.resume(11.0) == ""
     assert offer(arbiter, "never heard of", rank, LEFT, 11.0) == ""
@@ -465,7 +465,7 @@ def test_of_equals_that_fill_the_table_with_stops_the_last_one_drives_on(arbiter
     last = f"stopper {2 * MAX_NAMES - 1}"
     assert offer(arbiter, "script", SCRIPT, FORWARD, 1.0) != ""
     assert offer(arbiter, last, SCRIPT, FORWARD, 1.0) == ""
-    assert not arbiter.holds("teleop", PERSON, 1.0)
+    assert not arbiter.must_wait("teleop", PERSON, 1.0)
 
 
 class TestSoftwareStop:
@@ -496,7 +496,7 @@ class TestSoftwareStop:
     def test_an_autopilot_waits_for_resume_besides(self, arbiter: Arbiter) -> None:
         offer(arbiter, "controller", CONTROLLER, FORWARD, 1.0)
         arbiter.stop("ann@1", 1.1)
-        assert arbiter.held
+        assert arbiter.autopilots_wait
         arbiter.release(1.1)
         assert offer(arbiter, "controller", CONTROLLER, FORWARD, 9.0) == HELD
         assert arbiter.resume(9.1) == ""
@@ -513,7 +513,7 @@ class TestSoftwareStop:
     def test_resume_is_refused_while_it_holds(self, arbiter: Arbiter) -> None:
         arbiter.stop("ann@1", 1.0)
         assert arbiter.resume(2.0) == "stopped: by ann@1; `holozen release` lets it drive again"
-        assert (arbiter.resumed, arbiter.held) == (0, True)
+        assert (arbiter.resumed, arbiter.autopilots_wait) == (0, True)
 
     def test_a_joint_that_was_moved_stands_too(self, arbiter: Arbiter) -> None:
         offer(arbiter, "script", SCRIPT, JointMotion("position", (("arm", 1.0),)), 1.0)
@@ -580,10 +580,10 @@ class TestLostOperator:
 @pytest.mark.parametrize(("rank", "holds"), [(SCRIPT, False), (CONTROLLER, True)])
 def test_a_source_that_has_to_wait_is_held(arbiter: Arbiter, rank: int, holds: bool) -> None:
     offer(arbiter, "teleop", PERSON, FORWARD, 1.0)
-    assert arbiter.holds("me", rank, 9.0) == holds
+    assert arbiter.must_wait("me", rank, 9.0) == holds
     arbiter.stop("ann@1", 10.0)
     offer(arbiter, "me", rank, FORWARD, 10.1)
-    assert arbiter.holds("me", rank, 10.1)
+    assert arbiter.must_wait("me", rank, 10.1)
 
 
 def test_joint_commands_end_with_silence_even_where_the_watchdog_is_off() -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from holozen.command.local_stop import HANGS, TURNS, LocalStop, LocalStops, Served, stop_here
+from holozen.command.outcome import UNKNOWN_CALLER
 
 Make = Callable[..., LocalStops]
 
@@ -89,6 +90,13 @@ def test_a_process_that_hangs_is_stopped_all_the_same_and_keeps_the_stop(make: M
     assert written == [("Fred", "Ann")]
     # once they go on
     assert [order.by for server in (hung, turning) for order in server.take()] == ["Ann", "Ann"]
+
+
+def test_a_stop_by_nobody_is_kept_as_a_stop(make: Make) -> None:
+    written = list[str]()
+    make("Fred", write=lambda _robot, by: written.append(by))
+    stop_here(["here"], [], "")
+    assert written == [UNKNOWN_CALLER]
 
 
 def test_nobody_else_can_reach_the_socket_and_none_is_left_behind(

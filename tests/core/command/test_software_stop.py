@@ -188,7 +188,7 @@ def test_a_flood_of_names_lets_no_one_of_its_rank_through_and_delays_no_one_of_a
 def test_with_a_longer_watchdog_a_source_has_to_be_silent_for_longer() -> None:
     robot = Robot()
     robot.go("me", 1.1)
-    robot.arbiter.set_timeout(2.0, 1.1)
+    robot.arbiter.set_velocity_timeout(2.0, 1.1)
     robot.arbiter.release(1.1)
     assert "nothing for 2 s" in robot.go("me", 3.0)
     assert robot.go("me", 5.1) == ""

@@ -21,10 +21,10 @@ def test_the_next_reader_finds_what_was_written_last(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "folder"
     files = made(folder)
     for robot in ("", "Fred", "../Fred", "a/b", ".", "..", "x" * 64):
-        assert files.read(robot) == ""
-        for by in ("ann@1", "bob@2", ""):
+        assert files.read(robot) is None
+        for by in ("ann@1", "bob@2", None):
             files.write(robot, by)
-            assert (made(folder).read(robot), made(folder).read("Eve")) == (by, ""), robot
+            assert (made(folder).read(robot), made(folder).read("Eve")) == (by, None), robot
             if by:
                 assert os.stat(files.paths(robot)[0]).st_mode & 0o077 == 0
 
@@ -58,14 +58,14 @@ def test_a_sim_in_several_networks_keeps_its_stops_in_all_and_has_those_of_any(
     made(tmp_path, "a", "b").write("Fred", "ann@1")
     assert [made(tmp_path, *networks).read("Fred") for networks in ("a", "b", "bc", "c")] == [
         *3 * ["ann@1"],
-        "",
+        None,
     ]
     for spoilt, setter in ((b"", "ann@1"), (b"ann@1", "ann@1")):
         made(tmp_path, "a").paths("Fred")[0].write_bytes(spoilt)
         assert made(tmp_path, "a", "b").read("Fred") == setter
     files = made(tmp_path, "a", "b")
     assert files.read("Fred") == "ann@1"
-    files.write("Fred", "")
+    files.write("Fred", None)
     assert not any(path.exists() for path in files.paths("Fred"))
 
 
@@ -74,7 +74,7 @@ def test_a_stop_in_another_network_stops_nothing_and_is_reported(
 ) -> None:
     there = made(tmp_path, "a")
     there.write("Fred", "ann@1")
-    assert [made(tmp_path, "b").read(robot) for robot in ("Fred", "Ann")] == ["", ""]
+    assert [made(tmp_path, "b").read(robot) for robot in ("Fred", "Ann")] == [None, None]
     (line,) = capsys.readouterr().err.splitlines()
     assert (
         line
@@ -102,7 +102,7 @@ def test_what_cannot_be_read_stops_its_robot(
     files = made(tmp_path)
     files.paths("Fred")[0].parent.mkdir()
     spoil(files.paths("Fred")[0])
-    assert (files.read("Fred"), files.read("Ann")) == (UNREADABLE, "")
+    assert (files.read("Fred"), files.read("Ann")) == (UNREADABLE, None)
     (line,) = capsys.readouterr().err.splitlines()
     assert (
         str(files.paths("Fred")[0]) in line and "so Fred is stopped until `holozen release`" in line
@@ -117,7 +117,7 @@ def test_a_file_in_the_place_of_the_folder_stops_everyone_and_what_cannot_be_wri
     assert (files.read("Fred"), files.read("Ann")) == (UNREADABLE, UNREADABLE)
     capsys.readouterr()
     for robot in ("Fred", "Ann"):
-        for by in ("ann@1", "", "bob@2"):
+        for by in ("ann@1", None, "bob@2"):
             assert files.write(robot, by)
     written = capsys.readouterr().err
     assert written.count("stops hold, but not beyond the end of this process") == 2, (
@@ -145,7 +145,7 @@ def test_a_disk_that_hangs_holds_up_no_stop_and_gets_the_last_state_once_it_goes
     for robot, by in (
         ("Fred", "ann@1"),
         ("Fred", "bob@2"),
-        ("Fred", ""),
+        ("Fred", None),
         ("Fred", "eve@3"),
         ("Bob", "bob@2"),
     ):
@@ -159,5 +159,5 @@ def test_a_disk_that_hangs_holds_up_no_stop_and_gets_the_last_state_once_it_goes
     assert capsys.readouterr().err.count("the disk does not answer") == 3, (
         "once for each stop and release"
     )
-    wait_for(lambda: files.write("Fred", "") == "")
-    assert made(tmp_path).read("Fred") == ""
+    wait_for(lambda: files.write("Fred", None) == "")
+    assert made(tmp_path).read("Fred") is None

@@ -174,8 +174,8 @@ def test_of_two_equal_tags_the_first_counts_and_an_empty_one_has_no_effect() -> 
 
 def test_a_negative_timeout_switches_the_watchdog_off_which_is_reported_as_a_long_one_is() -> None:
     for name, text, timeout, long in (
-        ("cmdTimeout", "-1", -1, "for ever"),
-        ("cmd_timeout", "-0.2", -1, "for ever"),
+        ("cmdTimeout", "-1", None, "for ever"),
+        ("cmd_timeout", "-0.2", None, "for ever"),
         ("cmdTimeout", "60", 60, "for 60 s"),
     ):
         model = robot(plugin(f"<{name}>{text}</{name}>"))

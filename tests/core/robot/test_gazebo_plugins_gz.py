@@ -198,6 +198,17 @@ def test_an_odometry_publisher_without_a_drive_is_reported() -> None:
     assert message(model) == ["<plugin name='p'> publishes odometry, but the robot has no drive"]
 
 
+def test_a_tag_of_another_drive_is_reported_and_one_of_gazebo_alone_is_not() -> None:
+    tags = "<cmdTimeout>60</cmdTimeout><topic>go</topic><alwaysOn>true</alwaysOn>"
+    assert message(robot(plugin("velocity-control", tags))) == [
+        "<cmdTimeout> of <plugin name='p'> changes nothing: gz-sim-velocity-control-system does "
+        "not read it, as others do"
+    ]
+    publisher = plugin("odometry-publisher", "<odom_frame>o</odom_frame><topic>go</topic>")
+    (reason,) = message(robot(plugin("velocity-control"), publisher))
+    assert reason.startswith("<topic> of <plugin name='p'> changes nothing")
+
+
 def test_a_mistake_is_refused_with_the_tag() -> None:
     for system, tags, wrong in [
         ("diff-drive", "", "<plugin name='p'> has no <left_joint>; joints: fl, fr, rl, rr"),

@@ -681,7 +681,7 @@ def test_resume_is_refused_for_the_base_too_while_a_person_moves_a_joint(town: T
         (robot.commands.arbiters.base, (0.0, 0.0, 0.0)),
         (robot.commands.arbiters.joints, (0.5, 0.0, 0.0)),
     ):
-        arbiter.set_timeout(None, now := time.monotonic())
+        arbiter.set_velocity_timeout(None, now := time.monotonic())
         for motion in ((0.5, 0.0, 0.0), then):
             assert arbiter.offer("person", 1, motion, now).outcome.is_obeyed
     resume = town.client.session.declare_querier("Fred/resume")
@@ -695,7 +695,8 @@ def test_resume_is_refused_for_the_base_too_while_a_person_moves_a_joint(town: T
 
     wait_for(answered)
     assert replies[0].err and "person drives; stop it first" in replies[0].err.payload.to_string()
-    assert (robot.commands.arbiters.base.held, robot.commands.arbiters.base.resumed) == (True, 0)
+    base = robot.commands.arbiters.base
+    assert (base.autopilots_wait, base.resumed) == (True, 0)
 
 
 def test_a_stop_outlives_its_robot_and_a_thousand_others(

@@ -243,7 +243,7 @@ def test_a_person_takes_all_topics_from_a_script(topics: Topics) -> None:
     topics.take("right", 2.0, 10.1, "person@2", "INTERACTIVE_HIGH")
     topics.take("left", 1.0, 10.2)
     assert topics.pushes(10.3) == {"right": 2.0}
-    assert "overruled" in topics.stats.last
+    assert "overruled" in topics.stats.last_refusal
 
 
 def test_a_zero_from_an_equal_stops_all_topics(topics: Topics) -> None:
@@ -258,7 +258,7 @@ def test_what_is_no_plausible_force_is_refused(topics: Topics, bad: float) -> No
     topics.take("left", 1.0, 10.0)
     topics.take("left", bad, 10.1)
     assert topics.pushes(10.2) == {"left": 1.0}
-    assert sum(topics.stats.refused.values()) == 1 and "force.x is" in topics.stats.last
+    assert sum(topics.stats.refused.values()) == 1 and "force.x is" in topics.stats.last_refusal
 
 
 def test_a_zero_on_one_topic_is_no_stop_while_its_source_pushes_on_another(topics: Topics) -> None:
@@ -271,7 +271,7 @@ def test_a_zero_on_one_topic_is_no_stop_while_its_source_pushes_on_another(topic
         topics.take("left", 0.0, now)
     topics.arbiter.release(10.5)
     topics.take("right", 2.0, 10.7)
-    assert topics.pushes(10.7) is None and "let go first" in topics.stats.last
+    assert topics.pushes(10.7) is None and "let go first" in topics.stats.last_refusal
     topics.take("right", 0.0, 10.8)
     topics.take("right", 2.0, 10.9)
     assert topics.pushes(10.9) == {"right": 2.0}, "all of its topics were at zero"
@@ -317,7 +317,7 @@ def test_a_zero_for_one_joint_is_no_stop_while_its_source_moves_another() -> Non
         take(now, l=0.0)
     arbiter.release(10.5)
     take(10.7, r=5.0)
-    assert is_stop(arbiter.motion(10.7).value) and "let go first" in stats.last
+    assert is_stop(arbiter.motion(10.7).value) and "let go first" in stats.last_refusal
     take(10.8, l=0.0, r=0.0)
     take(10.9, r=5.0)
     assert not is_stop(arbiter.motion(10.9).value)
@@ -338,7 +338,7 @@ def test_a_zero_velocity_stops_the_robot_but_its_source_has_not_let_go_while_it_
     arbiter.release(10.2)
     velocities.take([zero], Moment(10.3, 10.3, ()))
     joints.take([turns], Moment(10.4, 10.4, ()))
-    assert is_stop(arbiter.motion(10.4).value) and "let go first" in stats.last
+    assert is_stop(arbiter.motion(10.4).value) and "let go first" in stats.last_refusal
     joints.take(
         [received(JointState(name=["w"], velocity=[0.0]), "me@1", key="joint_command")],
         Moment(10.5, 10.5, ()),
@@ -348,7 +348,7 @@ def test_a_zero_velocity_stops_the_robot_but_its_source_has_not_let_go_while_it_
     assert is_stop(arbiter.motion(10.7).value), "of its driver, any zero stops"
     velocities.take([received(Twist.planar(1.0), "bob@2", key="cmd_vel")], Moment(20.0, 20.0, ()))
     joints.take([turns], Moment(20.1, 20.1, ()))
-    assert arbiter.motion(20.1).value == (1.0, 0.0, 0.0) and "overruled" in stats.last
+    assert arbiter.motion(20.1).value == (1.0, 0.0, 0.0) and "overruled" in stats.last_refusal
     velocities.take([zero], Moment(20.2, 20.2, ()))
     assert is_stop(arbiter.motion(20.2).value), "an equal may stop it"
 
@@ -371,7 +371,7 @@ def test_what_its_source_moves_counts_for_the_robot_that_takes_its_place_too() -
     heir.inherit(arbiter, 20.0)
     take(heir, 20.1, l=0.0)
     take(heir, 20.2, r=5.0)
-    assert is_stop(heir.motion(20.2).value) and "let go first" in stats.last
+    assert is_stop(heir.motion(20.2).value) and "let go first" in stats.last_refusal
     heir.settle(30.0)  # long after that
     last = Arbiter(0.5)
     last.inherit(heir, 40.0)
@@ -397,10 +397,11 @@ def test_a_software_stop_ends_all_forces_until_the_source_has_let_go(topics: Top
     topics.take("left", 1.0, 10.0)
     topics.arbiter.stop("me", 10.1)
     topics.take("left", 1.0, 10.2)
-    assert topics.pushes(10.2) is None and topics.stats.last.startswith("me@1: stopped")
+    assert topics.pushes(10.2) is None and topics.stats.last_refusal.startswith("me@1: stopped")
     topics.arbiter.release(10.2)
     topics.take("left", 1.0, 10.3)
-    assert topics.pushes(10.3) is None and topics.stats.last.startswith("me@1: let go first")
+    assert topics.pushes(10.3) is None
+    assert topics.stats.last_refusal.startswith("me@1: let go first")
     topics.take("left", 0.0, 10.4)
     topics.take("left", 1.0, 10.5)
     assert topics.pushes(10.5) == {"left": 1.0}

@@ -115,7 +115,7 @@ def test_odometry_comes_at_its_rate_of_sim_time_with_the_frames_of_the_robot(sim
 def test_a_command_moves_the_robot_and_its_joints_and_shows_in_the_status(sim: Sim) -> None:
     odom = sim.bus.subscribe("Fred/odom", Odometry, depth=1000)
     joints = sim.bus.subscribe("Fred/joint_states", JointState, depth=1000)
-    sim.arbiter.timeout = None
+    sim.arbiter.velocity_timeout = None
     sim.arbiter.offer("me", 0, FORWARD, time.monotonic())
     sim.run(480)
     last = sim.all(odom)[-1]
@@ -235,7 +235,7 @@ def test_resume_is_a_service_between_the_steps(wire: Wire, ground: World) -> Non
     sim, me = Sim(wire, ground, rtf=1.0), wire.bus("me")
     with sim.running():
         assert me.call("Fred/resume", TriggerRequest(), TriggerReply).success
-        sim.arbiter.timeout = None
+        sim.arbiter.velocity_timeout = None
         sim.arbiter.offer("teleop@1", 1, FORWARD, time.monotonic())
         with pytest.raises(ServiceError, match=r"^teleop@1 drives; stop it first$"):
             me.call("Fred/resume", TriggerRequest(), TriggerReply)
@@ -354,7 +354,7 @@ def test_a_new_source_is_in_a_status_at_once(clock: list[float], sim: Sim) -> No
 
 def test_a_stop_that_waited_through_a_stall_is_obeyed(clock: list[float], sim: Sim) -> None:
     commands: Publisher[Twist] = sim.bus.publisher("Fred/cmd_vel", Twist)
-    sim.arbiter.timeout = None
+    sim.arbiter.velocity_timeout = None
     sim.arbiter.offer(sim.bus.source, 4, FORWARD, clock[0])
     clock[0] += 60
     commands.put(Twist())
@@ -368,7 +368,7 @@ def test_a_flood_of_commands_at_one_robot_pushes_out_no_stop_of_another(
     sim.entities.add("Ann", MODEL, ((3, 0, 0), UPRIGHT))
     flood: Publisher[Twist] = sim.bus.publisher("Ann/cmd_vel", Twist)
     commands: Publisher[Twist] = sim.bus.publisher("Fred/cmd_vel", Twist)
-    sim.arbiter.timeout = None
+    sim.arbiter.velocity_timeout = None
     sim.arbiter.offer(sim.bus.source, 4, FORWARD, clock[0])
     commands.put(Twist())
     for _ in range(5000):
@@ -414,7 +414,7 @@ def test_the_first_and_the_300th_robot_stand_when_their_drivers_fall_silent_and_
     assert not any(speeds())
     me = wire.bus("me")
     for robot, name in ((first, "Fred"), (last, "bot299")):
-        robot.commands.arbiters.base.set_timeout(None, clock[0])
+        robot.commands.arbiters.base.set_velocity_timeout(None, clock[0])
         robot.commands.arbiters.base.offer("me", 4, FORWARD, clock[0])
         assert sum(map(bool, speeds())) == 1
         with ThreadPoolExecutor() as pool:
@@ -430,7 +430,7 @@ def test_a_changed_timeout_applies_to_the_current_driver(clock: list[float], sim
     sim.run(240)
     sim.arbiter.offer("me", 4, FORWARD, clock[0])
     sim.run(1)
-    sim.arbiter.set_timeout(0.1, clock[0])
+    sim.arbiter.set_velocity_timeout(0.1, clock[0])
     clock[0] += 0.11
     sim.run(1)
     assert sim.robot.body.twist()[0] == (0, 0, 0)

@@ -55,7 +55,7 @@ class Recorded(Device):
     """
 
     def __init__(self, low: int = -32768, high: int = 32767, **more: bytes) -> None:
-        self._number, self.pen = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        self._descriptor, self.pen = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         self._rest = b""
         middle = absinfo((low + high + 1) // 2, low, high)
         self.answers = {

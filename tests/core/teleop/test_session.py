@@ -196,6 +196,26 @@ def test_odom_from_before_the_stop_is_no_proof_of_rest(wire: Wire, robot: Robot)
     assert session.mapper.engaged
 
 
+def test_rest_counts_once_the_robot_can_have_heard_the_stop(wire: Wire, robot: Robot) -> None:
+    """What arrives sooner over a slow link may have been sent before the robot began to move."""
+    session = session_of(wire, robot)
+    press(session, "i")
+    press(session, "k")
+    stopped = session.mapper.stopping_since()
+    assert stopped is not None
+
+    def rests(*sources: CommandSource) -> bool:
+        robot.status(sources=list(sources))
+        wait_for(lambda: session.client.status().sources == list(sources))
+        see(session, robot, RESTS / 2)
+        session.publish(stopped)
+        return not session.mapper.engaged
+
+    assert not rests(CommandSource("another@1", delay=0.01)), "it has heard nothing of us"
+    assert not rests(CommandSource(session.bus.source, delay=60.0)), "it hears us a minute late"
+    assert rests(CommandSource(session.bus.source, delay=1e-6))
+
+
 @pytest.mark.parametrize("speed", [(0.02, 0, 0), (0, -0.02, 0), (0, 0, 0.02)])
 def test_a_robot_that_moves_in_any_way_does_not_rest(
     wire: Wire, robot: Robot, speed: tuple[float, float, float]

@@ -310,7 +310,7 @@ def test_the_time_of_another_server_and_one_that_is_still_to_come_prove_nothing(
 def test_what_is_asked_after_a_reply_was_sent_after_what_it_tells(wire: Wire) -> None:
     """However late the caller reads what the server sends."""
     guarded = Guarded(wire)
-    heard = guarded.caller.heard
+    heard = guarded.caller.server_times
     call = partial(guarded.caller.call, "release", TriggerRequest(), TriggerReply, 60.0)
     assert answered_while(guarded.server, call).success
     assert [*heard] == [guarded.server_id]

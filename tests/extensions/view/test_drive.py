@@ -42,7 +42,7 @@ def test_a_driver_goes_when_no_page_has_its_robot_and_its_pad_rests(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     odom = {f"{name}/odom": feedback(0.0) for name in ("one", "other")}
-    monkeypatch.setattr(drive, "RobotFeedback", lambda _, key: odom[key])
+    monkeypatch.setattr(drive, "RobotFeedback", lambda _, key, status: odom[key])
     drivers = Drivers(MagicMock())
     one, other = (SceneEntity(name, command=f"{name}/cmd_vel") for name in ("one", "other"))
     kept, dropped = drivers.of(one), drivers.of(other)
