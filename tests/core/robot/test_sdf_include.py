@@ -270,5 +270,7 @@ def test_what_gazebo_forgives_in_a_model_is_forgiven(home: Path) -> None:
     (path.parent / "model.config").write_text(
         "<model><name>Walls & Doors</name><sdf>model.sdf</sdf></model>"
     )
-    (model,), _ = read(home, "<uri>model://house</uri>")
+    (model,), warnings = read(home, "<uri>model://house</uri>")
     assert model.pose.xyz == (4e6, 5e6, 0)
+    assert warnings[0].startswith(f"{path.parent}/model.config, line 1: ")
+    assert "&amp;" in warnings[0]
