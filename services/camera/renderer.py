@@ -89,6 +89,9 @@ class Renderer:
         projection = bullet.computeProjectionMatrixFOV(
             math.degrees(high), camera.width / camera.height, near, far
         )
+        # The engine draws half a pixel too far to the right and up.
+        projection = list(projection)
+        projection[8], projection[9] = 1 / camera.width, 1 / camera.height
         _, _, rgba, depth, _ = bullet.getCameraImage(
             camera.width,
             camera.height,

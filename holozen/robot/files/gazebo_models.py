@@ -114,7 +114,7 @@ MODELS: dict[str, tuple[float, str, Sequence[Piece]]] = {
         [_round("cone", 0.18, 0.64, 0, 0, 0.34), _box(0.38, 0.38, 0.04)],
     ),
     "construction_barrel": (20.0, ORANGE, [_round("cylinder", 0.295, 1.03)]),
-    "coke_can": (0.39, RED, [_round("cylinder", 0.033, 0.123, 0, 0, 0)]),
+    "coke_can": (0.39, RED, [_round("cylinder", 0.033, 0.123)]),
     "beer": (0.39, RED, [_round("cylinder", 0.055, 0.23)]),
 }
 """Name -> mass in kg (0: it is static), its colour and its pieces."""

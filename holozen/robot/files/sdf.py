@@ -620,7 +620,7 @@ def _found(outer: Piece, uri: str) -> Path | None:
             outer.tag, f"({cut(uri)}) is not fetched and is left out; write model://NAME"
         )
         return None
-    files = (file for place in places if (file := _model_file(place)))
+    files = (file for place in places if (file := _model_file(place, outer.source)))
     found = next(
         (file for file in files if not outer.source.confined or _is_known(file, outer.source)), None
     )
@@ -685,21 +685,23 @@ def _package(name: str, source: Source) -> Path | None:
         return None
 
 
-def _model_file(place: Path) -> Path | None:
-    """The SDF file that `place` is, or the one that the folder `place` names in its
-    model.config.
+def _model_file(place: Path, source: Source) -> Path | None:
+    """The SDF file that `place` is, or the one that the folder `place` names in its model.config,
+    whose warnings go to `source`.
     """
     if os.path.isfile(place):
         return Path(os.path.realpath(place))
     config = place / "model.config"
-    names = [*_configured(config), "model.sdf"] if os.path.isfile(config) else ["model.sdf"]
+    names = [*_configured(config, source), "model.sdf"] if os.path.isfile(config) else ["model.sdf"]
     found = (place / name for name in names if os.path.isfile(place / name))
     return next((Path(os.path.realpath(file)) for file in found), None)
 
 
-def _configured(config: Path) -> list[str]:
+def _configured(config: Path, source: Source) -> list[str]:
     """The files that a model.config names, newest SDF version first; none outside its folder."""
-    tags = read_file(config, Source(config, {})).all("sdf")
+    own = Source(config, {})
+    tags = read_file(config, own).all("sdf")
+    source.warnings += own.warnings
     names = [tag.text.strip() for tag in sorted(tags, key=version_of, reverse=True)]
     return [name for name in names if "/" not in name and "\\" not in name]
 

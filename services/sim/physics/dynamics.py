@@ -78,15 +78,13 @@ def damping_of(parts: Sequence[Part], number: int, dt: float, implicit: bool = F
 
 def _carrier(parts: Sequence[Part], part: Part) -> float:
     """The inertia of the part that carries this one, about this one's joint axis; its mass for a
-    prismatic joint.
+    prismatic joint. Infinite for one without, such as a link `world`, which the engine holds.
     """
     assert part.joint is not None, "nothing carries the root"
     carrier = parts[part.parent].body
-    return (
-        carrier.mass
-        if part.joint.kind == "prismatic"
-        else carrier.moment(rotate(part.rotation, part.joint.axis))
-    )
+    if part.joint.kind == "prismatic":
+        return carrier.mass or math.inf
+    return carrier.moment(rotate(part.rotation, part.joint.axis)) or math.inf
 
 
 def _inertia(part: Part, axis: XYZ) -> float:

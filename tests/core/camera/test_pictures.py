@@ -68,6 +68,18 @@ def test_a_red_box_is_where_geometry_puts_it(renderer: Any) -> None:
     assert (np.isfinite(seen.depth) == red).mean() > 0.99, "there is nothing else"
 
 
+def test_a_box_is_where_geometry_puts_it_within_a_fifth_of_a_pixel(renderer: Any) -> None:
+    look, edge, away = looks("<box size='0.6 0.6 0.6'/>"), 0.6, 1.5
+    off = []
+    for step in range(10):
+        left, up = 0.003 * step, 0.0047 * step  # m; less than a pixel from one to the next
+        seen = picture(renderer, (look, Pose(Point(away + edge / 2, left, HIGH + up))))
+        rows, columns = np.nonzero((seen.colors[:, :, 0] > 60) & (seen.colors[:, :, 1] < 30))
+        middle = (HEIGHT - 1) / 2 - up / away * FOCAL, (WIDTH - 1) / 2 - left / away * FOCAL
+        off.append((rows.mean() - middle[0], columns.mean() - middle[1]))
+    assert np.abs(np.mean(off, axis=0)).max() < 0.2
+
+
 def test_the_depth_of_a_tilted_wall_is_that_of_its_plane(renderer: Any) -> None:
     """Along the view, not along the ray; to the edges of the field of view."""
     turned = Quaternion(0.0, 0.0, math.sin(TILT / 2), math.cos(TILT / 2))

@@ -6,6 +6,7 @@ import pytest
 
 from holozen.robot.errors import RobotError
 from holozen.robot.files.elements import Source
+from holozen.robot.files.gazebo_models import MODELS
 from holozen.robot.files.sdf_models import read_models
 from holozen.robot.model import RobotModel
 from holozen.robot.rigid import link_frames
@@ -255,11 +256,21 @@ def test_an_everyday_model_that_is_nowhere_has_the_size_of_gazebo_s(home: Path, 
     assert read(home, "<uri>model://cafe_table</uri>")[0][0].links.keys() == {"a"}
 
 
+def test_the_everyday_models_stand_where_they_are_put() -> None:
+    """But for cubes of wood, whose origin is their middle, as in Gazebo."""
+    for name, (_, _, pieces) in MODELS.items():
+        bottom = min(at[2] - size[-1] / 2 for _, size, at in pieces)
+        middle = pieces[0][1][2] / 2 if name.startswith("wood_cube") else 0
+        assert bottom == pytest.approx(-middle, abs=0.01), name
+
+
 def test_what_gazebo_forgives_in_a_model_is_forgiven(home: Path) -> None:
     """A raw & in its model.config, a scale of 0, and a place far away."""
     path = put(home / "models", "house", text=MODEL.replace("0 0 1", "4e6 5e6 0"))
     (path.parent / "model.config").write_text(
         "<model><name>Walls & Doors</name><sdf>model.sdf</sdf></model>"
     )
-    (model,), _ = read(home, "<uri>model://house</uri>")
+    (model,), warnings = read(home, "<uri>model://house</uri>")
     assert model.pose.xyz == (4e6, 5e6, 0)
+    assert warnings[0].startswith(f"{path.parent}/model.config, line 1: ")
+    assert "&amp;" in warnings[0]

@@ -45,6 +45,16 @@ def test_no_damping_stops_more_than_there_is(base: float) -> None:
     assert damping_of(wheel(1e3, base), 1, DT) * DT <= both * (1 + 1e-9)
 
 
+def test_a_carrier_without_mass_does_not_yield() -> None:
+    text = (
+        '<link name="world"/><link name="b"><inertial><mass value="1"/><inertia ixx="1" iyy="1" '
+        'izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="j" type="continuous">'
+        '<parent link="world"/><child link="b"/><axis xyz="0 0 1"/><dynamics damping="2"/></joint>'
+    )
+    parts = assemble(parse(f'<robot name="r">{text}</robot>', Path("r.urdf")))
+    assert damping_of(parts, 1, DT) == pytest.approx(2, rel=0.01)
+
+
 def test_what_has_no_damping_and_the_root_get_none() -> None:
     assert damping_of(wheel(0), 1, DT) == 0
     assert damping_of(wheel(1), 0, DT) == 0

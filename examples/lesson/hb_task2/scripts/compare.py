@@ -34,10 +34,12 @@ class Compare(Node):
         self.picture = CvBridge().imgmsg_to_cv2(msg, "bgr8")
 
     def place(self, x, y, z):
-        """The pixel (right, down) at which a point of the world must be."""
+        """The pixel (right, down) at which a point of the world must be, from the middle of the
+        first one.
+        """
         size = self.picture.shape[0]
         pixels = size / 2 / math.tan(FIELD_OF_VIEW / 2) / (CAMERA - z)  # in a metre
-        return size / 2 - y * pixels, size / 2 - x * pixels
+        return (size - 1) / 2 - y * pixels, (size - 1) / 2 - x * pixels
 
     def marker(self, robot):
         """The corners (4, 2) of a marker in pixels, from its top left round."""

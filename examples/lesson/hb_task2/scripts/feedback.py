@@ -38,10 +38,10 @@ class Feedback(Node):
         for corners, number in zip(found, [] if numbers is None else numbers.ravel(), strict=True):
             if number in self.poses:
                 # The corners of a marker go round from its top left; ahead is its right.
-                # Up in the picture is x, left is y.
+                # Up in the picture is x, left is y; pixels count from the middle of the first.
                 right, down = corners[0].mean(axis=0)
                 ahead = corners[0][1:3].mean(axis=0) - corners[0][[0, 3]].mean(axis=0)
-                x, y = (height / 2 - down) * metres, (width / 2 - right) * metres
+                x, y = ((height - 1) / 2 - down) * metres, ((width - 1) / 2 - right) * metres
                 self.poses[number].publish(
                     Pose2D(x=float(x), y=float(y), theta=math.atan2(-ahead[0], -ahead[1]))
                 )
