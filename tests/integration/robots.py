@@ -24,6 +24,7 @@ from holozen.messages.rcl_interfaces import (
 )
 from holozen.testing import wait_for
 from holozen.testing.process import PATIENCE
+from holozen.transport.graph import on_key
 from holozen.transport.pubsub import Received, Subscription
 from holozen.transport.samples import Sample
 from holozen.wire import key_for
@@ -126,6 +127,7 @@ class Robot:
         self._status = record(bus, key_for("cmd_vel_status", name), CommandStatus)
         self._publisher = bus.publisher(key_for("cmd_vel", name), Twist, priority)
         self.odom.next(within=60)  # its sim, and what starts that, may only just have begun
+        wait_for(self._status.messages, what=f"a status of {name or 'the robot at the root'}")
 
     def wait_longer(self, seconds: float = 2.0) -> "Robot":
         """Let it stop only after so much silence: a test that measures a drive may be held up.
@@ -185,6 +187,17 @@ class Robot:
         odoms: list[Odometry] = part.messages()[:seen]
         return odoms
 
+    def knows(self, node: str) -> None:
+        """Wait for the link to a node that publishes commands: before that it may be heard by
+        others, and not here.
+        """
+        key = key_for("cmd_vel", self.name)
+        with self.bus.graph() as graph:
+            wait_for(
+                lambda: any(end.node == node for end in on_key(graph.endpoints(), key, "pub")),
+                what=f"a link to {node}",
+            )
+
     def stands(self) -> Odometry:
         """Wait until the robot rests; the odom that shows it."""
         odom: Odometry = self.odom.next(rests)
@@ -215,10 +228,10 @@ class Robot:
         """Let everybody drive again. Raises ServiceError if the sim refuses."""
         return self.bus.call(key_for("resume", self.name), TriggerRequest(), TriggerReply).message
 
-    def last_status(self) -> Any:
-        """The newest status; None before the first."""
-        messages = self._status.messages()
-        return messages[-1] if messages else None
+    def last_status(self) -> CommandStatus:
+        """The newest status."""
+        status: CommandStatus = self._status.messages()[-1]
+        return status
 
 
 def time_of(odom: Odometry) -> float:
