@@ -58,9 +58,11 @@ def test_a_goal_that_is_only_looked_at_is_reported(verb: Verb, wire: Wire) -> No
 
 
 def test_it_waits_for_as_many_subscribers_as_requested(town: Wire, robot: Robot) -> None:
-    pub = town.start("topic", "pub", "cmd_vel", AHEAD, "--once", "-w", "3")
-    pub.wait_for_line("waiting for 3 subscribers to cmd_vel (2 so far)")
+    pub = town.start("topic", "pub", "cmd_vel", AHEAD, "--once", "-w", "4")
+    pub.wait_for_line("waiting for 4 subscribers to cmd_vel (2 so far)")
     other = town.bus("other").subscribe("cmd_vel", Twist)
+    pub.wait_for_line("waiting for 4 subscribers to cmd_vel (3 so far)")
+    town.bus("fourth").subscribe("cmd_vel", Twist)
     assert pub.wait() == 0 or LATE in pub.err, pub.err
     assert other.recv().message == Twist.planar(0.2)
 
