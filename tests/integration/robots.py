@@ -127,7 +127,6 @@ class Robot:
         self._status = record(bus, key_for("cmd_vel_status", name), CommandStatus)
         self._publisher = bus.publisher(key_for("cmd_vel", name), Twist, priority)
         self.odom.next(within=60)  # its sim, and what starts that, may only just have begun
-        wait_for(self._status.messages, what=f"a status of {name or 'the robot at the root'}")
 
     def wait_longer(self, seconds: float = 2.0) -> "Robot":
         """Let it stop only after so much silence: a test that measures a drive may be held up.
@@ -182,7 +181,7 @@ class Robot:
 
         wait_for(
             look,
-            what=lambda: f"the robot to be driven as commanded; its status: {self.last_status()}",
+            what=lambda: f"the robot to be driven so; its status: {self._status.messages()[-1:]}",
         )
         odoms: list[Odometry] = part.messages()[:seen]
         return odoms
@@ -229,8 +228,8 @@ class Robot:
         return self.bus.call(key_for("resume", self.name), TriggerRequest(), TriggerReply).message
 
     def last_status(self) -> CommandStatus:
-        """The newest status."""
-        status: CommandStatus = self._status.messages()[-1]
+        """The newest status; waits for the first."""
+        status: CommandStatus = wait_for(self._status.messages, what="a status")[-1]
         return status
 
 
