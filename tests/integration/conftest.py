@@ -5,7 +5,6 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from typing import TypeVar
 
 import pytest
 import zenoh
@@ -18,7 +17,6 @@ from .robots import Robot
 
 Verb = Callable[..., subprocess.CompletedProcess[str]]
 Done = subprocess.CompletedProcess[str]
-T = TypeVar("T")
 PATIENT = 2.0  # s
 SPAWN = ("spawn", "--timeout", "30")  # s for a sim that a busy machine holds up
 LATE = "not obeyed: late: "  # what `topic pub` says of a command that was held up
@@ -73,7 +71,7 @@ def verb(call: Verb) -> Verb:
     return lambda wire, *words: call(*words, *wire.flags)
 
 
-def comes_to(wanted: T, look: Callable[[], T]) -> None:
+def comes_to(wanted: object, look: Callable[[], object]) -> None:
     """Wait until a look gives what is wanted. One look at the graph leaves out a node that a busy
     machine does not let answer within half a second.
     """
