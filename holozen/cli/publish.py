@@ -288,7 +288,7 @@ def _matched(
     count as one.
     """
     wanted, deadline = args.wait or 1, args.max_wait and time.monotonic() + args.max_wait
-    graph, reported = None, False
+    graph, reported = None, -1  # the number in the last report
     while True:
         while not publisher.matched and (deadline is None or time.monotonic() < deadline):
             if stop.wait(0.002):
@@ -300,10 +300,10 @@ def _matched(
         found = subscribers(ends, args.key, publisher.matched)
         if found >= wanted or (deadline and time.monotonic() > deadline) or stop.wait(0.01):
             return found
-        if not reported:
+        if found != reported:
             awaited = f"{wanted} subscribers" if wanted > 1 else "a subscriber"
             report(f"waiting for {awaited} to {args.key} ({found or 'none'} so far)")
-            reported = True
+            reported = found
 
 
 def _turns(

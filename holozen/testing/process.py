@@ -28,6 +28,8 @@ START = [sys.executable, "-m", "holozen"]
 """The words that start holozen in a new Python; a verb follows."""
 FIXED = ("PYTHON", "LANG", "LC_", "LD_", "MALLOC_", "OPENBLAS_")
 """How the names of those variables begin that count only when a program starts."""
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
+"""What holozen's command line sets where it is unset, also in a test that calls it."""
 PARENTS = ("up", "launch")
 """Verbs that are not forked: all that they start is in a new Python, and `ps` shows their own
 words.
@@ -293,7 +295,9 @@ def _can_fork(words: Sequence[str], env: Mapping[str, str]) -> bool:
 
 
 def _fixed(env: Mapping[str, str]) -> dict[str, str]:
-    return {name: value for name, value in env.items() if name.startswith(FIXED)}
+    """Those variables, as they are once holozen's command line has begun."""
+    begun = {**ONE_THREAD, **env}
+    return {name: value for name, value in begun.items() if name.startswith(FIXED)}
 
 
 _starting = threading.Lock()
@@ -303,14 +307,14 @@ _starting = threading.Lock()
 def _server() -> tuple[socket.socket, dict[str, str]]:
     """The socket of this process's fork server, and the variables that all it forks have."""
     ours, theirs = socket.socketpair(type=socket.SOCK_SEQPACKET)
+    env = {**os.environ, **ONE_THREAD}  # a process with threads cannot be forked
     with theirs:
         process = subprocess.Popen(
             [sys.executable, "-m", "holozen.testing.fork_server", str(theirs.fileno())],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             pass_fds=[theirs.fileno()],
-            # a process with threads cannot be forked
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+            env=env,
             start_new_session=True,
         )
 
@@ -319,7 +323,7 @@ def _server() -> tuple[socket.socket, dict[str, str]]:
         process.wait()
 
     atexit.register(end)
-    return ours, _fixed(os.environ)
+    return ours, _fixed(env)
 
 
 def _content(file: IO[bytes]) -> str:

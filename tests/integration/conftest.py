@@ -11,10 +11,15 @@ import zenoh
 
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.errors import ServiceError
+from holozen.wire import COMMAND_SILENCE
 
 from .robots import Robot
 
 Verb = Callable[..., subprocess.CompletedProcess[str]]
+Done = subprocess.CompletedProcess[str]
+PATIENT = 2.0  # s
+SPAWN = ("spawn", "--timeout", "30")  # s for a sim that a busy machine holds up
+LATE = "not obeyed: late: "  # what `topic pub` says of a command that was held up
 
 
 @pytest.fixture(scope="module")
@@ -50,11 +55,34 @@ def robot(only_robot: Robot) -> Robot:
 
 
 @pytest.fixture
+def patient(robot: Robot) -> Iterator[Robot]:
+    """The file's robot, for a source that has to stay fresh on a busy machine: it stops after
+    PATIENT only.
+    """
+    yield robot.wait_longer(PATIENT)
+    robot.wait_longer(COMMAND_SILENCE)
+
+
+@pytest.fixture
 def verb(call: Verb) -> Verb:
     """`verb(wire, "topic", "list")`: run `holozen topic list` on a wire, in this process. As a
     process of its own each verb is tried in test_every_verb.py.
     """
     return lambda wire, *words: call(*words, *wire.flags)
+
+
+def comes_to(wanted: object, look: Callable[[], object]) -> None:
+    """Wait until a look gives what is wanted. One look at the graph leaves out a node that a busy
+    machine does not let answer within half a second.
+    """
+    wait_for(lambda: look() == wanted, what=lambda: f"{wanted!r}; a look gives {look()!r}")
+
+
+def in_time(command: Callable[[], Done]) -> Done:
+    """What became of a command that came in time: another one, where a busy machine held it up."""
+    done = wait_for(lambda: None if LATE in (done := command()).stderr else done)
+    assert done
+    return done
 
 
 def start_sim(wire: Wire, *flags: str) -> Process:

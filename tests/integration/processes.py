@@ -1,6 +1,7 @@
 """What processes of a test print, leave in bags, and which of them run."""
 
 import os
+import re
 import subprocess
 from pathlib import Path
 
@@ -22,6 +23,13 @@ def read(path: Path) -> list[Message]:
     """All messages of a bag."""
     with Bag(path) as bag:
         return list(bag.messages())
+
+
+def stopped(output: str) -> list[str]:
+    """The robots that `stop` says are stopped; of a process that a busy machine holds up it says
+    that it hangs, too.
+    """
+    return sorted(re.findall(r"^(\S+) is stopped(?:$|: its process hangs)", output, re.M))
 
 
 def words_of(pid: int) -> list[str]:

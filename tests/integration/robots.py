@@ -24,6 +24,7 @@ from holozen.messages.rcl_interfaces import (
 )
 from holozen.testing import wait_for
 from holozen.testing.process import PATIENCE
+from holozen.transport.graph import on_key
 from holozen.transport.pubsub import Received, Subscription
 from holozen.transport.samples import Sample
 from holozen.wire import key_for
@@ -180,10 +181,21 @@ class Robot:
 
         wait_for(
             look,
-            what=lambda: f"the robot to be driven as commanded; its status: {self.last_status()}",
+            what=lambda: f"the robot to be driven so; its status: {self._status.messages()[-1:]}",
         )
         odoms: list[Odometry] = part.messages()[:seen]
         return odoms
+
+    def knows(self, node: str) -> None:
+        """Wait for the link to a node that publishes commands: before that it may be heard by
+        others, and not here.
+        """
+        key = key_for("cmd_vel", self.name)
+        with self.bus.graph() as graph:
+            wait_for(
+                lambda: any(end.node == node for end in on_key(graph.endpoints(), key, "pub")),
+                what=f"a link to {node}",
+            )
 
     def stands(self) -> Odometry:
         """Wait until the robot rests; the odom that shows it."""
@@ -215,10 +227,10 @@ class Robot:
         """Let everybody drive again. Raises ServiceError if the sim refuses."""
         return self.bus.call(key_for("resume", self.name), TriggerRequest(), TriggerReply).message
 
-    def last_status(self) -> Any:
-        """The newest status; None before the first."""
-        messages = self._status.messages()
-        return messages[-1] if messages else None
+    def last_status(self) -> CommandStatus:
+        """The newest status; waits for the first."""
+        status: CommandStatus = wait_for(self._status.messages, what="a status")[-1]
+        return status
 
 
 def time_of(odom: Odometry) -> float:

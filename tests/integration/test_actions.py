@@ -1,6 +1,7 @@
 """Goals for the controller and for the sim, sent by `holozen action`, and whatever ends them."""
 
 import json
+import math
 import signal
 from collections.abc import Iterator
 from typing import Any
@@ -13,7 +14,7 @@ from holozen.messages.geometry_msgs import Point, Pose
 from holozen.messages.std_msgs import Header
 from holozen.testing import LockStep, Process, Wire, wait_for
 
-from .conftest import Verb, start_sim
+from .conftest import Verb, comes_to, start_sim
 from .processes import assert_one_line
 from .robots import Robot, moves, place, rests
 
@@ -22,7 +23,7 @@ FAR = 1e5  # m; a goal that is not reached
 END = "the controller "
 REMOVED = "the robot was removed or replaced, or the link to it was lost"
 RESET = "the robot was reset or moved"
-SPAWN = ("spawn", BOT, "--name", "Fred", "-x", "20")
+SPAWN = ("spawn", "--timeout", "30", BOT, "--name", "Fred", "-x", "20")
 
 
 def pose(x: float, y: float = 0.0, **more: Any) -> dict[str, Any]:
@@ -84,13 +85,14 @@ def test_the_robot_drives_to_a_pose_and_tells_how_far_it_is(town: Wire, robot: R
     x = place(robot.newest())[0]
     process = send(town, "navigate_to_pose", {"pose": pose(x + 0.3, header={"frame_id": "odom"})})
     assert result(process) == ("SUCCEEDED", {"error_code": 0, "error_msg": ""})
-    first, *_, last = [
-        json.loads(line)["feedback"] for line in process.out.splitlines() if "feedback" in line
-    ]
-    assert first["distance_remaining"] == pytest.approx(0.3, abs=0.02)
-    assert last["distance_remaining"] < 0.2
-    assert last["current_pose"]["header"]["frame_id"] == "odom"
-    assert place(robot.stands())[:2] == pytest.approx((x + 0.3, 0.0), abs=0.02)
+    told = [json.loads(line)["feedback"] for line in process.out.splitlines() if "feedback" in line]
+    for feedback in told:
+        at = feedback["current_pose"]["pose"]["position"]
+        left = math.dist((x + 0.3, 0.0), (at["x"], at["y"]))
+        assert feedback["distance_remaining"] == pytest.approx(left, abs=0.01)
+    assert told[-1]["distance_remaining"] < told[0]["distance_remaining"]
+    assert told[-1]["current_pose"]["header"]["frame_id"] == "odom"
+    assert place(robot.stands())[:2] == pytest.approx((x + 0.3, 0.0), abs=0.05)
 
 
 def test_the_robot_follows_waypoints_from_an_index_on_and_in_loops(
@@ -111,7 +113,7 @@ def test_the_robot_follows_waypoints_from_an_index_on_and_in_loops(
     ]
     assert list(dict.fromkeys(numbers)) == [1, 2, 0]
     assert numbers[-1] == 2
-    assert place(robot.stands())[:2] == pytest.approx((0.2, 0.1), abs=0.02)
+    assert place(robot.stands())[:2] == pytest.approx((0.2, 0.1), abs=0.05)
 
 
 def test_a_wrong_goal_is_rejected_with_the_reason(town: Wire, verb: Verb) -> None:
@@ -251,12 +253,9 @@ def test_the_lists_leave_out_what_an_action_consists_of(town: Wire, verb: Verb) 
         (("service", "list"), "simulate_steps/_action/send_goal"),
     ):
         assert "_action" not in verb(town, *words).stdout
-        assert hidden in verb(town, *words, f"--include-hidden-{words[0]}s").stdout.splitlines()
-    assert (
-        verb(town, "action", "list").stdout
-        == "follow_waypoints\nnavigate_to_pose\nsimulate_steps\n"
-    )
-    assert (
-        verb(town, "action", "type", "/navigate_to_pose").stdout
-        == "nav2_msgs/action/NavigateToPose\n"
-    )
+        every = (*words, f"--include-hidden-{words[0]}s")
+        wait_for(lambda: hidden in verb(town, *every).stdout.splitlines())  # noqa: B023
+    listed = "follow_waypoints\nnavigate_to_pose\nsimulate_steps\n"
+    comes_to(listed, lambda: verb(town, "action", "list").stdout)
+    kind = "nav2_msgs/action/NavigateToPose\n"
+    comes_to(kind, lambda: verb(town, "action", "type", "/navigate_to_pose").stdout)

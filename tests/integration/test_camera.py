@@ -20,6 +20,8 @@ from holozen.messages.geometry_msgs import Point
 from holozen.robot.files.meshes import write_stl
 from holozen.testing import LockStep, Wire, wait_for
 
+from .conftest import SPAWN
+
 WIDTH, HEIGHT, ACROSS = 160, 120, 1.2  # pixels, rad
 FOCAL = WIDTH / 2 / math.tan(ACROSS / 2)
 HIGH = 0.5  # m; of the camera
@@ -300,7 +302,7 @@ def test_a_camera_that_hangs_the_renderer_is_dropped_and_the_others_go_on(
     inside = bus.subscribe("blind/inside/image_raw", Image, depth=1, limit=1_000_000)
     seen = bus.subscribe("cam/image_raw", Image, depth=1, limit=1_000_000)
     (tmp_path / "blind.urdf").write_text(blind)
-    ended = wire.run("spawn", str(tmp_path / "blind.urdf"), "-x", "5", "-z", "1")
+    ended = wire.run(*SPAWN, str(tmp_path / "blind.urdf"), "-x", "5", "-z", "1")
     assert ended.returncode == 0, ended.stderr
     sim.wait_for_line(
         "a picture of blind/inside/image_raw took more than 5 s; it gets no more pictures",

@@ -10,9 +10,12 @@ from collections.abc import Iterator
 
 import pytest
 
-from holozen.testing import Process, Wire
+from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 from tests.faults.namespaces import NEEDS, Host, Lab
+
+from .conftest import comes_to
+from .processes import stopped
 
 OTHER = 12345  # the id of a user
 
@@ -44,9 +47,13 @@ def test_two_stacks_side_by_side_each_see_and_stop_only_their_own_robots(machine
         machine.start(*command("sim", *robot, "--domain", domain)).wait_for_line("listens on")
     for domain, name in (("1", "Ann"), ("2", "Fred")):
         variable = ("env", f"HOLOZEN_DOMAIN={domain}")
-        assert machine.run(*variable, *command("list")).stdout.split()[0] == name
-        assert machine.run(*variable, *command("topic", "list")).stdout.count("/odom") == 1
-    assert machine.run(*command("stop", "--domain", "1")).stdout == "Ann is stopped\n"
+
+        def listed(*words: str, variable: tuple[str, str] = variable) -> str:
+            return machine.run(*variable, *command(*words)).stdout
+
+        comes_to([name], lambda: listed("list").split()[:1])
+        comes_to(1, lambda: listed("topic", "list").count("/odom"))
+    assert stopped(machine.run(*command("stop", "--domain", "1")).stdout) == ["Ann"]
     status = command(
         "topic", "echo", "Fred/cmd_vel_status", "--once", "--field", "stopped", "--domain", "2"
     )
@@ -57,10 +64,14 @@ def test_two_stacks_side_by_side_each_see_and_stop_only_their_own_robots(machine
 @NEEDS
 def test_doctor_names_the_port_of_the_domain_and_the_variable_that_sets_it(machine: Host) -> None:
     machine.start(*command("pose-service", "--domain", "7")).wait_for_line("goal")
-    reported = machine.run("env", "ROS_DOMAIN_ID=7", *command("doctor"), within=60).stdout
-    assert "ROS_DOMAIN_ID=7 applies to every verb without --domain" in reported
-    assert "tcp/127.0.0.1:7517 is free" in reported
-    assert "1 of this version: pose_service" in reported
+
+    def reports() -> bool:
+        reported = machine.run("env", "ROS_DOMAIN_ID=7", *command("doctor"), within=60).stdout
+        assert "ROS_DOMAIN_ID=7 applies to every verb without --domain" in reported
+        assert "tcp/127.0.0.1:7517 is free" in reported
+        return "1 of this version: pose_service" in reported
+
+    wait_for(reports)
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root becomes another user")

@@ -16,6 +16,7 @@ from holozen.testing import Wire, wait_for
 from holozen.transport.errors import ServiceError
 from holozen.transport.pubsub import Latest
 
+from .conftest import SPAWN
 from .processes import assert_one_line
 
 LIMIT = 60.0  # s for `holozen spawn` on a busy machine
@@ -111,7 +112,7 @@ def test_an_impossible_robot_is_one_error_line(
     text, reported = FAULTS[fault]
     file = tmp_path / ("r.urdf.xacro" if "xmlns:xacro" in text else "r.urdf")
     file.write_text(text.replace(MANY, 100_000_000 * "x"))
-    ended = town.run("spawn", str(file), "--name", "Fred", within=LIMIT)
+    ended = town.run(*SPAWN, str(file), "--name", "Fred", within=LIMIT)
     assert_one_line(ended, 1, str(file), reported)
 
 
@@ -138,14 +139,14 @@ def test_an_unusable_mesh_is_one_warning_and_the_robot_stands_on_a_box(
     (tmp_path / "part.stl").write_bytes(make())
     file = tmp_path / "r.urdf"
     file.write_text(robot(link("a", INERTIAL.format(1) + MESH.format("part.stl")) + DRIVE))
-    ended = town.run("spawn", str(file), "--name", "Fred", within=3 * LIMIT)
+    ended = town.run(*SPAWN, str(file), "--name", "Fred", within=3 * LIMIT)
     assert (ended.returncode, ended.stdout) == (0, "Fred listens on Fred/cmd_vel\n")
     lines = ended.stderr.splitlines()
     assert len(lines) <= 1 and all("part.stl" in line and reported in line for line in lines)
     assert bool(lines) or not reported
     entities.delete(bus, "Fred")
     if reported:
-        assert town.run("spawn", str(file), "--strict", within=3 * LIMIT).returncode == 1
+        assert town.run(*SPAWN, str(file), "--strict", within=3 * LIMIT).returncode == 1
 
 
 def test_four_hundred_links_are_a_robot_like_any_other(
@@ -155,7 +156,7 @@ def test_four_hundred_links_are_a_robot_like_any_other(
     links = "".join(link(name, INERTIAL.format(0.01) + BALL.format(0.1)) for name in names)
     joints = "".join(joint("l0", name) for name in names[1:])
     (tmp_path / "r.urdf").write_text(robot(links + joints + DRIVE))
-    ended = town.run("spawn", str(tmp_path / "r.urdf"), "--name", "Fred", within=LIMIT)
+    ended = town.run(*SPAWN, str(tmp_path / "r.urdf"), "--name", "Fred", within=LIMIT)
     assert (ended.returncode, ended.stdout, ended.stderr) == (
         0,
         "Fred listens on Fred/cmd_vel\n",

@@ -9,7 +9,7 @@ from holozen.messages import TwistStamped
 from holozen.testing import Terminal, Wire, wait_for
 
 from .conftest import Verb
-from .robots import URDF, Record, Robot, moves, place, planar
+from .robots import URDF, Robot, moves, place, planar
 
 V, W = 0.4, 0.8  # m/s, rad/s
 ESCAPE = "\x1b"
@@ -34,10 +34,12 @@ def start_teleop(wire: Wire, *flags: str) -> Terminal:
     return terminal
 
 
-def after(commands: Record, terminal: Terminal, key: str) -> tuple[float, ...]:
+def after(robot: Robot, terminal: Terminal, key: str) -> tuple[float, ...]:
     """The first command that is not a stop after the key was pressed on a robot that stands:
     pressed again where it came while the teleop was held up, and so does not count.
     """
+    robot.knows("teleop")
+    commands = robot.commands
     part = commands.from_now()
 
     def pressed() -> object:
@@ -52,11 +54,15 @@ def after(commands: Record, terminal: Terminal, key: str) -> tuple[float, ...]:
 def test_a_key_press_in_a_terminal_moves_the_robot(town: Wire, robot: Robot) -> None:
     with start_teleop(town) as terminal:
         start, commands = robot.newest(), robot.commands.from_now()
-        terminal.hold_until("i", lambda: moves(robot.newest(), 0.5, 0, 0))
+
+        def has_moved() -> bool:
+            newest = robot.newest()
+            return moves(newest, 0.5, 0, 0) and place(newest)[0] > place(start)[0] + 0.1
+
+        terminal.hold_until("i", has_moved)
         wait_for(commands.all, what="the command, which may come after the odometry that it caused")
         assert {received.priority for received in commands.all()} == {"INTERACTIVE_HIGH"}
         end = robot.stands()
-        assert place(end)[0] > place(start)[0] + 0.1
         assert place(end)[1] == pytest.approx(place(start)[1], abs=1e-3)
 
 
@@ -67,7 +73,7 @@ def test_where_nothing_shows_that_a_terminal_hangs_a_key_counts_for_5_s(
     """This terminal answers no query."""
     with start_teleop(town, *flags) as terminal:
         terminal.wait_for_text("5 s in a terminal that does not answer")
-        after(robot.commands, terminal, "i")
+        after(robot, terminal, "i")
         terminal.freeze()
         robot.wait_for_stop_command()
         robot.stands()
@@ -92,7 +98,7 @@ def test_without_another_key_the_robot_stops_after_the_key_timeout(
 ) -> None:
     with start_teleop(town, "--key-timeout", "0.2") as terminal:
         commands = robot.commands.from_now()
-        after(robot.commands, terminal, "i")
+        after(robot, terminal, "i")
         robot.wait_for_stop_command()
         # At 20 Hz; after the default of 0.5 s it would be ten of them and more.
         assert sum(any(planar(command)) for command in commands.messages()) <= 6
@@ -101,7 +107,7 @@ def test_without_another_key_the_robot_stops_after_the_key_timeout(
 def test_a_repeat_rate_of_zero_sends_a_command_once(town: Wire, robot: Robot) -> None:
     with start_teleop(town, "--repeat-rate", "0", "--mode", "latch") as terminal:
         commands = robot.commands.from_now()
-        after(robot.commands, terminal, "i")
+        after(robot, terminal, "i")
         robot.pass_time(0.4)
         assert [planar(command) for command in commands.messages()] == [(0.5, 0, 0, 0)]
         terminal.type("k")
@@ -110,9 +116,9 @@ def test_a_repeat_rate_of_zero_sends_a_command_once(town: Wire, robot: Robot) ->
 
 def test_stamped_commands_carry_time_and_frame_and_drive_too(town: Wire, robot: Robot) -> None:
     with start_teleop(town, "--stamped", "--frame-id", "base_link") as terminal:
-        after(robot.commands, terminal, "J")
-        robot.odom.next(lambda odom: moves(odom, 0, 0.5, 0))
-        command = robot.commands.messages()[-1]
+        commands = robot.commands.from_now()
+        terminal.hold_until("J", lambda: moves(robot.newest(), 0, 0.5, 0) and commands.messages())
+        command = commands.messages()[0]
         assert isinstance(command, TwistStamped)
         assert command.header.frame_id == "base_link"
         assert command.header.stamp.sec > 0
@@ -156,6 +162,6 @@ def test_a_robot_has_one_name_in_list_map_teleop_and_doctor(
 ) -> None:
     with start_teleop(town) as terminal:
         terminal.wait_for_text("holozen teleop   hb_bot")
-    assert verb(town, "list").stdout.startswith("hb_bot ")
-    assert "hb_bot x " in verb(town, "map", "--once").stdout
-    assert "nothing commands hb_bot now; " in verb(town, "doctor").stdout
+    wait_for(lambda: verb(town, "list").stdout.startswith("hb_bot "))
+    wait_for(lambda: "hb_bot x " in verb(town, "map", "--once").stdout)
+    wait_for(lambda: "nothing commands hb_bot now; " in verb(town, "doctor").stdout)

@@ -14,6 +14,8 @@ from holozen.testing import Process, Terminal, wait_for
 from holozen.testing.wire import command
 from tests.faults.namespaces import NEEDS, Cable, Host, Lab
 
+from .conftest import comes_to
+
 pytestmark = NEEDS
 
 ZENOH = str(Path(sys.executable).with_name("zenoh"))
@@ -104,9 +106,8 @@ def test_the_commands_of_the_readme_work_as_they_stand(network: Host, up: Proces
         env={"PYTHONUNBUFFERED": "1"},
     ) as subscriber:
         subscriber.wait_for_line("footprint_link")
-    assert network.run(*command("topic", "info", "cmd_vel")).stdout.startswith(
-        "Type: geometry_msgs/msg/Twist\n"
-    )
+    kind = "Type: geometry_msgs/msg/Twist\n"
+    wait_for(lambda: network.run(*command("topic", "info", "cmd_vel")).stdout.startswith(kind))
     assert json.loads(network.run(*command("topic", "echo", "odom", "--once", "--json")).stdout)[
         "child_frame_id"
     ]
@@ -137,7 +138,7 @@ def test_a_router_listens_on_loopback_only_too_and_peers_go_on_while_it_takes_th
         assert (scouts(network), groups(network)) == ({"lo"}, {"lo"})
         with Process(network.inside(*command("sim"))) as sim:
             sim.wait_for_line("listens on")
-            echo = command("topic", "echo", "odom", "--once", "--timeout", "10")
+            echo = command("topic", "echo", "odom", "--once", "--timeout", "20")
             assert network.run(*echo).returncode == 0
             assert network.run(*echo, *CLIENT).returncode == 0
 
@@ -198,8 +199,8 @@ def test_nothing_of_the_scouting_leaves_loopback_or_comes_in(two: tuple[Host, Ho
         sys.executable, "-c", STRANGER, cable.address(there), cable.address(here), *ports
     )
     assert stranger == ""
-    assert set(here.check(*command("node", "list")).split()) == {"sim", "pose_service"}
-    assert "in\n" in capture.out, "what came in was seen"
+    comes_to(["pose_service", "sim"], lambda: here.check(*command("node", "list")).split())
+    capture.wait_for_line("in")  # what came in was seen
     assert "out\n" not in capture.out
 
 
@@ -242,7 +243,7 @@ def test_without_multicast_on_loopback_processes_say_so_once_and_meet_at_the_add
         "tcp/127.0.0.1:7447 alone\n"
     )
     assert (sim.out + sim.err).count(line) == (service.out + service.err).count(line) == 1
-    wait_for(lambda: network.check(*command("node", "list")).split() == ["pose_service", "sim"])
+    comes_to(["pose_service", "sim"], lambda: network.check(*command("node", "list")).split())
 
 
 def test_a_foreign_program_at_the_port_is_a_warning_and_no_obstacle(network: Host) -> None:
@@ -255,4 +256,4 @@ def test_a_foreign_program_at_the_port_is_a_warning_and_no_obstacle(network: Hos
         sim = network.start(*command("sim"))
         sim.wait_for_line("listens on")
         assert "tcp/127.0.0.1:7447 is held by" in sim.out + sim.err
-        assert network.check(*command("node", "list")) == "sim\n"
+        comes_to("sim\n", lambda: network.check(*command("node", "list")))

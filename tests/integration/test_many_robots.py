@@ -12,7 +12,7 @@ from holozen.testing.process import run
 from holozen.testing.wire import command
 from tests.faults.proxy import Proxy
 
-from .conftest import Verb, start_sim
+from .conftest import SPAWN, Verb, comes_to, start_sim
 from .processes import assert_one_line
 from .robots import Robot, distance, moves, place, record
 
@@ -77,17 +77,17 @@ def test_their_frames_carry_their_names(fred: Robot, ann: Robot) -> None:
 
 
 def test_there_is_no_robot_at_the_root(verb: Verb, town: Wire, fred: Robot) -> None:
+    def is_shown() -> bool:
+        info = verb(town, "topic", "info", "Fred/cmd_vel").stdout
+        return "Type: geometry_msgs/msg/Twist\n" in info and "  sim (" in info
+
+    wait_for(is_shown)
     assert verb(town, "topic", "info", "cmd_vel").returncode == 1
-    info = verb(town, "topic", "info", "Fred/cmd_vel").stdout
-    assert "Type: geometry_msgs/msg/Twist\n" in info
-    assert "  sim (" in info
 
 
 def test_the_driver_of_fred_has_no_say_over_ann(town: Wire, fred: Robot, ann: Robot) -> None:
     person = Robot(town.bus("person"), "Fred", "INTERACTIVE_HIGH")
-    person.drive(
-        0.3, until=lambda _: (status := fred.last_status()) and status.obeyed.startswith("person@")
-    )
+    person.drive(0.3, until=lambda _: fred.last_status().obeyed.startswith("person@"))
     assert ann.status().obeyed == ""
     ann.drive(0.2)
 
@@ -174,16 +174,19 @@ def test_a_second_sim_only_joins_with_named_robots_and_then_both_are_one_world_t
 
 
 def assert_both_are_one_world(verb: Verb, wire: Wire) -> None:
-    wait_for(
-        lambda: (
-            [line.split()[0] for line in verb(wire, "list").stdout.splitlines()] == ["Ann", "Fred"]
-        )
+    comes_to(
+        ["Ann", "Fred"],
+        lambda: [line.split()[0] for line in verb(wire, "list").stdout.splitlines()],
     )
-    clock = json.loads(verb(wire, "topic", "info", "clock", "--json").stdout)
-    assert len(clock["publishers"]) == 1
+
+    def clocks() -> int:
+        shown = verb(wire, "topic", "info", "clock", "--json").stdout
+        return len(json.loads(shown)["publishers"]) if shown else 0
+
+    comes_to(1, clocks)
     assert "duplicates" not in verb(wire, "doctor").stdout
     Robot(wire.bus(), "Ann").drive(0.3)
     assert verb(wire, "param", "set", "Ann/sim", "max_linear", "0.2").returncode == 0
     assert verb(wire, "delete", "Ann", "Fred").returncode == 0
     assert verb(wire, "list").stdout == ""
-    assert verb(wire, "spawn", str(BOT), "--name", "Joe").returncode == 0, "one of them spawns"
+    assert verb(wire, *SPAWN, str(BOT), "--name", "Joe").returncode == 0, "one of them spawns"

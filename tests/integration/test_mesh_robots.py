@@ -10,7 +10,7 @@ import pytest
 from holozen import data
 from holozen.testing import Process, Wire, wait_for
 
-from .conftest import Verb
+from .conftest import SPAWN, Verb
 
 INERTIAL = '<inertial><mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01"/></inertial>'
 # radius 0.14 m, 0.13 m wide
@@ -41,7 +41,7 @@ def test_a_mesh_robot_stands_on_its_hull(
 ) -> None:
     done = verb(
         town,
-        "spawn",
+        *SPAWN,
         str(robot(tmp_path, WHEEL)),
         "--name",
         name,
@@ -63,7 +63,7 @@ def test_a_robot_without_its_mesh_stands_on_a_box_and_is_reported(
 ) -> None:
     done = verb(
         town,
-        "spawn",
+        *SPAWN,
         str(robot(tmp_path, '<mesh filename="gone.stl"/>')),
         "--name",
         "lost",

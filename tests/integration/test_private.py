@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,8 @@ from holozen.testing.wire import command
 from holozen.transport.connection import from_environment
 from holozen.transport.errors import BusError
 from holozen.transport.private import folder
+
+from .conftest import Verb, comes_to
 
 Start = Callable[..., Process]
 
@@ -85,20 +88,20 @@ def test_a_robot_is_driven_without_any_port_and_processes_meet_whoever_dies(star
     late = start("pose-service")
     late.wait_for_line("goal")
 
-    def listed() -> str:
-        listing = start("node", "list")
-        assert listing.wait() == 0
-        return listing.out
+    comes_to("pose_service\npose_service\n", partial(listed, start))
 
-    assert listed() == "pose_service\npose_service\n"
+
+def listed(start: Start, *flags: str) -> str:
+    """The nodes."""
+    listing = start("node", "list", *flags)
+    assert listing.wait() == 0
+    return listing.out
 
 
 def test_domains_are_kept_apart_in_private_too(start: Start) -> None:
     start("pose-service").wait_for_line("goal")
-    other = start("node", "list", "--domain", "1")
-    assert (other.wait(), other.out) == (0, "")
-    same = start("node", "list")
-    assert (same.wait(), same.out) == (0, "pose_service\n")
+    comes_to("pose_service\n", partial(listed, start))
+    assert listed(start, "--domain", "1") == ""
 
 
 def test_one_that_is_suspended_in_private_delays_nobody_and_is_met_when_it_wakes_up(
@@ -108,24 +111,16 @@ def test_one_that_is_suspended_in_private_delays_nobody_and_is_met_when_it_wakes
     asleep.wait_for_line("goal")
     asleep.signal(signal.SIGSTOP)
     start("sim").wait_for_line("listens on")
-    listing = start("node", "list")
-    assert (listing.wait(), listing.out) == (0, "sim\n")
+    comes_to("sim\n", partial(listed, start))
     asleep.signal(signal.SIGCONT)
-
-    def listed() -> str:
-        listing = start("node", "list")
-        listing.wait()
-        return listing.out
-
-    wait_for(lambda: listed() == "pose_service\nsim\n")
+    comes_to("pose_service\nsim\n", partial(listed, start))
 
 
 def test_a_router_and_its_client_are_private_too(start: Start) -> None:
     router = start("router")
     router.wait_for_line("listens at unixsock-stream/")
     assert ports(router.pid) == set()
-    listing = start("node", "list", "--mode", "client")
-    assert (listing.wait(), listing.out) == (0, "router\n")
+    comes_to("router\n", partial(listed, start, "--mode", "client"))
 
 
 FOREIGN_NODE = """
@@ -234,22 +229,20 @@ def test_the_sockets_of_killed_processes_are_removed_and_of_others_kept(start: S
     assert len([*Path(folder()).glob(f"0-{service.pid}-*")]) == 2
 
 
-@pytest.mark.parametrize(
-    ("flag", "value"),
-    [
+@pytest.mark.usefixtures("runtime")
+def test_what_would_open_a_port_is_refused(call: Verb) -> None:
+    for flag, value in (
         ("--listen", "tcp/0.0.0.0:7447"),
         ("--connect", "tcp/127.0.0.1:7447"),
         ("--config", os.devnull),
-    ],
-)
-def test_what_would_open_a_port_is_refused(start: Start, flag: str, value: str) -> None:
-    listing = start("node", "list", flag, value)
-    assert listing.wait() == 2
-    variable = f"HOLOZEN_{flag[2:].upper()}"
-    assert listing.err == (
-        f"holozen: --private (or HOLOZEN_PRIVATE) excludes {flag}: leave it out, and unset "
-        f"{variable}\n"
-    )
-    setting = start("node", "list", "--cfg", 'listen/endpoints:["tcp/0.0.0.0:7447"]')
-    assert setting.wait() == 2
-    assert "excludes --cfg listen/endpoints: leave it out" in setting.err
+    ):
+        done = call("node", "list", flag, value)
+        variable = f"HOLOZEN_{flag[2:].upper()}"
+        assert (done.returncode, done.stderr) == (
+            2,
+            f"holozen: --private (or HOLOZEN_PRIVATE) excludes {flag}: leave it out, and unset "
+            f"{variable}\n",
+        )
+    done = call("node", "list", "--cfg", 'listen/endpoints:["tcp/0.0.0.0:7447"]')
+    assert done.returncode == 2
+    assert "excludes --cfg listen/endpoints: leave it out" in done.stderr

@@ -13,8 +13,9 @@ from holozen.cli.publish import STEPS
 from holozen.messages import CommandStatus, JointState, Message, PoseStamped, Twist, Wrench
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
+from holozen.transport.graph import on_key
 
-from .conftest import Verb
+from .conftest import LATE, Verb, in_time
 from .processes import assert_one_line
 from .robots import Robot, moves, record
 
@@ -34,10 +35,8 @@ def test_it_reports_the_number_of_subscribers(verb: Verb, town: Wire, robot: Rob
 
     # a busy machine may discover one of them late, or make a single command too old
     wait_for(reported)
-    output = json.loads(
-        verb(town, "topic", "pub", "cmd_vel", "{}", "-t", "2", "-w", "2", "--json").stdout
-    )
-    assert output == {
+    twice = ("cmd_vel", "{}", "-t", "2", "-w", "2", "--json")
+    assert json.loads(verb(town, "topic", "pub", *twice).stdout) == {
         "key": "cmd_vel",
         "type": "geometry_msgs/msg/Twist",
         "subscribers": 2,
@@ -47,21 +46,25 @@ def test_it_reports_the_number_of_subscribers(verb: Verb, town: Wire, robot: Rob
 
 def test_a_goal_that_is_only_looked_at_is_reported(verb: Verb, wire: Wire) -> None:
     wire.start("topic", "echo", "Fred/goal_pose")
+    mine = wire.bus("mine")
+    wait_for(lambda: on_key(mine.endpoints(), "Fred/goal_pose", "sub"), what="the echo")
     done = verb(wire, "topic", "pub", "Fred/goal_pose", "{}", "--once")
     assert (done.returncode, done.stdout) == (1, "")
     why = "no controller reads it, only topic_echo; `holozen controller Fred --laps 0` drives there"
     assert done.stderr == f"1 subscriber of Fred/goal_pose\nFred/goal_pose: {why}\n"
-    goals = wire.bus("mine").subscribe("Fred/goal_pose", PoseStamped)
+    goals = mine.subscribe("Fred/goal_pose", PoseStamped)
     done = verb(wire, "topic", "pub", "Fred/goal_pose", "{}", "--once", "-w", "2")
     assert done.returncode == 0 and done.stderr.endswith("2 subscribers of Fred/goal_pose\n")
     assert goals.recv().message == PoseStamped()
 
 
 def test_it_waits_for_as_many_subscribers_as_requested(town: Wire, robot: Robot) -> None:
-    pub = town.start("topic", "pub", "cmd_vel", AHEAD, "--once", "-w", "3")
-    pub.wait_for_line("waiting for 3 subscribers to cmd_vel (2 so far)")
+    pub = town.start("topic", "pub", "cmd_vel", AHEAD, "--once", "-w", "4")
+    pub.wait_for_line("waiting for 4 subscribers to cmd_vel (2 so far)")
     other = town.bus("other").subscribe("cmd_vel", Twist)
-    assert pub.wait() == 0
+    pub.wait_for_line("waiting for 4 subscribers to cmd_vel (3 so far)")
+    town.bus("fourth").subscribe("cmd_vel", Twist)
+    assert pub.wait() == 0 or LATE in pub.err, pub.err
     assert other.recv().message == Twist.planar(0.2)
 
 
@@ -99,26 +102,20 @@ def test_it_needs_no_subscriber_where_it_does_not_wait(verb: Verb, town: Wire) -
         assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.parametrize(
-    ("value", "expected"),
-    [
+def test_a_wrong_field_is_refused_with_the_closest_name(verb: Verb, town: Wire) -> None:
+    for value, expected in (
         ('{"linaer": {}}', "has no field 'linaer' (did you mean 'linear'?)"),
         ('{"angular": {"zz": 1}}', "has no field 'angular.zz' (did you mean 'z'?)"),
         ('{"linear": {"x": "1"}}', "linear.x: '1' is not a valid float64"),
         ("linear: {x: .inf}", "linear.x is not a finite number; --force sends it all the same"),
-    ],
-)
-def test_a_wrong_field_is_refused_with_the_closest_name(
-    verb: Verb, town: Wire, value: str, expected: str
-) -> None:
-    assert_one_line(
-        verb(town, "topic", "pub", "cmd_vel", value, "--once"), 1, "refused: ", expected
-    )
+    ):
+        done = verb(town, "topic", "pub", "cmd_vel", value, "--once")
+        assert_one_line(done, 1, "refused: ", expected)
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "expected"),
-    [
+def test_what_no_robot_can_mean_is_refused_and_not_sent(verb: Verb, wire: Wire) -> None:
+    bus = wire.bus()
+    for key, value, expected in (
         ("cmd_vel", '{"linear": {"x": 1e308}}', "linear.x is 1e+308 m/s; at most 100"),
         ("Fred/cmd_vel", "twist: {angular: {y: -1001}}", "angular.y is -1001 rad/s; at most 1000"),
         (
@@ -126,16 +123,12 @@ def test_a_wrong_field_is_refused_with_the_closest_name(
             "{name: [j], velocity: [2e3]}",
             "velocity[0] of joint 'j' is 2000; at most 1000",
         ),
-    ],
-)
-def test_what_no_robot_can_mean_is_refused_and_not_sent(
-    verb: Verb, wire: Wire, key: str, value: str, expected: str
-) -> None:
-    heard = wire.bus().subscribe_raw(key)
-    often = ("--once",) if key != "cmd_vel" else ("-r", "20")
-    done = verb(wire, "topic", "pub", key, value, *often)
-    assert_one_line(done, 1, f"{key}: refused: {expected}; --force sends it all the same")
-    assert heard.try_recv() is None
+    ):
+        heard = bus.subscribe_raw(key)
+        often = ("--once",) if key != "cmd_vel" else ("-r", "20")
+        done = verb(wire, "topic", "pub", key, value, *often)
+        assert_one_line(done, 1, f"{key}: refused: {expected}; --force sends it all the same")
+        assert heard.try_recv() is None
 
 
 def test_a_type_that_the_key_does_not_carry_is_refused(verb: Verb, town: Wire) -> None:
@@ -148,21 +141,20 @@ def test_a_type_that_the_key_does_not_carry_is_refused(verb: Verb, town: Wire) -
     assert verb(town, *words, "--force").returncode == 0
 
 
-@pytest.mark.parametrize("wire_name", ["json", "cdr"])
-def test_force_sends_what_the_sim_then_refuses_and_reports_it(
-    town: Wire, robot: Robot, wire_name: str
-) -> None:
-    words = ["{linear: {x: .nan}}", "-r", "20", "--force", "--wire", wire_name]
-    pub = town.start("topic", "pub", "cmd_vel", *words)
-    pub.wait_for_line("not obeyed: ")
-    assert pub.interrupt() == 0
-    robot.stands()
+def test_force_sends_what_the_sim_then_refuses_and_reports_it(town: Wire, robot: Robot) -> None:
+    for wire_name in ("json", "cdr"):
+        words = ["{linear: {x: .nan}}", "-r", "20", "--force", "--wire", wire_name]
+        pub = town.start("topic", "pub", "cmd_vel", *words)
+        pub.wait_for_line("not obeyed: ")
+        assert pub.interrupt() == 0
+        robot.stands()
 
 
 def test_a_robot_that_stands_between_slow_commands_has_obeyed_them(
     verb: Verb, town: Wire, robot: Robot
 ) -> None:
-    done = verb(town, "topic", "pub", "cmd_vel", AHEAD, "-r", "1", "--times", "1")
+    slowly = ("cmd_vel", AHEAD, "-r", "1", "--times", "1")
+    done = in_time(lambda: verb(town, "topic", "pub", *slowly))
     assert (done.returncode, "not obeyed" in done.stderr) == (0, False)
 
 
@@ -192,14 +184,15 @@ def test_of_a_paused_sim_it_says_so_instead_of_to_try_again(
 
     def driven() -> bool:
         commands.put(Twist.planar(0.2))
-        return bool(robot.last_status().obeyed == person.source)
+        return robot.last_status().obeyed == person.source
 
     wait_for(driven)
     try:
         assert verb(town, "sim", "pause").returncode == 0
         wait_for(driven)
         person.close()
-        done = verb(town, "topic", "pub", "cmd_vel", AHEAD, "-t", "5", "-r", "10")
+        often = ("cmd_vel", AHEAD, "-t", "5", "-r", "10")
+        done = in_time(lambda: verb(town, "topic", "pub", *often))
     finally:
         assert verb(town, "sim", "play").returncode == 0
     assert (done.returncode, done.stderr.splitlines()[-1].startswith("not obeyed: ")) == (
@@ -261,8 +254,14 @@ def test_a_forced_mistake_is_named_also_where_another_one_drives(
 ) -> None:
     driver = town.start("topic", "pub", "cmd_vel", AHEAD)
     robot.odom.next(lambda odom: moves(odom, 0.2, 0, 0))
-    done = verb(town, "topic", "pub", "cmd_vel", '{"linear": {"x": 1e308}}', "--once", "--force")
-    assert "not obeyed: linear.x is 1e+308 m/s; at most 100" in done.stderr
+    mistake = ("cmd_vel", '{"linear": {"x": 1e308}}', "--once", "--force")
+
+    def named() -> bool:
+        # the status tells of the last refusal alone, which a busy machine makes one of the driver's
+        why = "not obeyed: linear.x is 1e+308 m/s; at most 100"
+        return why in verb(town, "topic", "pub", *mistake).stderr
+
+    wait_for(named)
     assert driver.interrupt() == 0
     robot.stands()
 
@@ -278,9 +277,8 @@ def test_lines_of_standard_input_are_published_and_the_robot_stops_at_their_end(
     town: Wire, robot: Robot
 ) -> None:
     words = command("topic", "pub", "cmd_vel", "--stdin", *town.flags)
-    with subprocess.Popen(words, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as pub:
-        assert pub.stdin and pub.stderr
-        seen = robot.odom
+    with subprocess.Popen(words, stdin=subprocess.PIPE, text=True) as pub:
+        assert pub.stdin
 
         def type_line(line: str, driven: tuple[float, ...]) -> None:
             def driving() -> bool:
@@ -294,7 +292,6 @@ def test_lines_of_standard_input_are_published_and_the_robot_stops_at_their_end(
         type_line("linear: {y: 0.1}", (0, 0.1, 0))
         pub.stdin.close()
         assert pub.wait() == 0
-    assert seen
     robot.stands()
 
 

@@ -64,7 +64,10 @@ def begun(line: str) -> Iterator[Process | Terminal]:
 def ends(line: str) -> None:
     """Run a command to its end."""
     with Process([sys.executable, "-m", *shlex.split(line)]) as process:
-        assert process.wait(40) == 0, f"{line}: {process.out}{process.err}"
+        # on a busy machine doctor finds that something is slow
+        codes = (0, 1) if line.startswith("holozen doctor") else (0,)
+        assert process.wait(40) in codes, f"{line}: {process.out}{process.err}"
+        assert "Traceback" not in process.err, line
 
 
 def runs(line: str) -> None:
@@ -84,7 +87,7 @@ def runs(line: str) -> None:
 def test_what_watches_a_robot_watches_it(wire: Wire) -> None:
     up = wire.start("up")
     up.wait_for_line("goals")
-    wait_for(lambda: "controller" in wire.run("node", "list").stdout, 20)
+    wait_for(lambda: "controller" in wire.run("node", "list").stdout)
     for line in commands("Watch it"):
         runs(line)
 

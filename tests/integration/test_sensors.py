@@ -90,11 +90,16 @@ class Eyes:
 
     def after(self, steps: int = STEPS) -> dict[str, list[Any]]:
         """All messages of so many steps: the reply of `step_simulation` follows them on the same
-        link.
+        link. A few steps at a time: of thousands of messages at once a full link drops some.
         """
         self.forget()
-        self.sim.step(steps)
-        return self.forget()
+        found: dict[str, list[Any]] = {key: [] for key in self._read}
+        while steps > 0:
+            self.sim.step(min(steps, STEPS))
+            steps -= STEPS
+            for key, messages in self.forget().items():
+                found[key] += messages
+        return found
 
     def forget(self) -> dict[str, list[Any]]:
         return {

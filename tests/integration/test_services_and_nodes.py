@@ -1,6 +1,7 @@
 """`holozen service`, `node` and `router`, and the command line as a whole."""
 
 import json
+import re
 import subprocess
 from collections.abc import Iterator
 from importlib.metadata import version
@@ -8,10 +9,11 @@ from importlib.metadata import version
 import pytest
 
 from holozen.testing import Process, Wire, wait_for
+from holozen.testing.process import run
 from holozen.testing.wire import command
 from holozen.wire import SERVICES
 
-from .conftest import Verb, start_sim
+from .conftest import Verb, comes_to, start_sim
 from .processes import assert_one_line
 from .robots import Robot, place
 
@@ -42,10 +44,11 @@ def test_service_list_names_every_service(verb: Verb, town: Wire) -> None:
         lambda: {key for key in shown() if not key.endswith("_parameters")} == set(services),
         what=lambda: repr(shown()),
     )
-    assert (listed := shown()) == sorted(set(listed))
-    lines = verb(town, "service", "list", "-t").stdout.splitlines()
-    assert {f"{key} [{kind}]" for key, kind in services.items()} <= set(lines)
-    assert "resume [std_srvs/srv/Trigger]" in lines
+    listed = shown()
+    assert listed == sorted(set(listed))
+    typed = {f"{key} [{kind}]" for key, kind in services.items()}
+    assert "resume [std_srvs/srv/Trigger]" in typed
+    wait_for(lambda: typed <= {*verb(town, "service", "list", "-t").stdout.splitlines()})
 
 
 def test_service_call_prints_the_reply(verb: Verb, town: Wire) -> None:
@@ -144,12 +147,10 @@ def test_clients_meet_through_a_router(wire: Wire) -> None:
         ):
             sim.wait_for_line("listens on")
             service.wait_for_line("goals")
-            words = command("topic", "echo", "odom", "--once", "--timeout", "10", *client)
-            assert subprocess.run(words, capture_output=True, timeout=30).returncode == 0
-            nodes = subprocess.run(
-                command("node", "list", *client), capture_output=True, text=True
-            ).stdout
-            assert nodes.split() == ["pose_service", "router", "sim"]
+            echo = command("topic", "echo", "odom", "--once", "--timeout", "20", *client)
+            assert run(echo).returncode == 0
+            nodes = ["pose_service", "router", "sim"]
+            comes_to(nodes, lambda: run(command("node", "list", *client)).stdout.split())
             assert service.terminate() == 0
             assert sim.terminate() == 0
         assert router.terminate() == 0
@@ -164,8 +165,8 @@ def test_clients_wait_for_their_router_and_find_it_again(wire: Wire) -> None:
             with Process(command("router", "--listen", wire.endpoint)) as router:
                 router.wait_for_line("listens at")
                 sim.wait_for_line("listens on cmd_vel")
-                words = command("topic", "echo", "odom", "--once", "--timeout", "15", *client)
-                assert subprocess.run(words, capture_output=True, timeout=30).returncode == 0
+                echo = command("topic", "echo", "odom", "--once", "--timeout", "20", *client)
+                assert run(echo).returncode == 0
                 router.kill()
         assert sim.terminate() == 0
 
@@ -194,13 +195,25 @@ def test_the_version_is_that_of_the_package() -> None:
 
 
 def test_service_type_find_and_info(verb: Verb, town: Wire) -> None:
-    assert verb(town, "service", "type", "resume").stdout == "std_srvs/srv/Trigger\n"
-    assert verb(town, "service", "find", "NextGoal").stdout == "next_goal\n"
-    lines = verb(town, "service", "info", "next_goal").stdout.splitlines()
-    assert lines[:2] == ["Type: holozen/srv/NextGoal", "Services count: 1"]
-    assert lines[2].startswith("  pose_service (")
-    output = json.loads(verb(town, "service", "info", "next_goal", "--json").stdout)
-    assert [server["node"] for server in output["servers"]] == ["pose_service"]
+    for words, shown in (
+        ("type resume", "std_srvs/srv/Trigger\n"),
+        ("find NextGoal", "next_goal\n"),
+        (
+            "info next_goal",
+            "Type: holozen/srv/NextGoal\nServices count: 1\n  pose_service (SESSION)\n",
+        ),
+        (
+            "info next_goal --json",
+            '{"key": "next_goal", "types": ["holozen/srv/NextGoal"], '
+            '"servers": [{"node": "pose_service", "session": "SESSION"}]}\n',
+        ),
+    ):
+
+        def look(words: str = words) -> str:
+            done = verb(town, "service", *words.split())
+            return re.sub(r"\b[0-9a-f]{6,}\b", "SESSION", done.stdout)
+
+        comes_to(shown, look)
 
 
 def test_service_call_again_and_again(town: Wire) -> None:
@@ -211,6 +224,8 @@ def test_service_call_again_and_again(town: Wire) -> None:
 
 
 def test_node_info_shows_what_a_node_reads_writes_and_serves(verb: Verb, town: Wire) -> None:
+    # the tokens of what it serves come last
+    wait_for(lambda: "simulate_steps" in verb(town, "node", "info", "sim").stdout)
     lines = verb(town, "node", "info", "sim").stdout.splitlines()
     assert lines[1:3] == ["  Subscribers:", "    cmd_vel: geometry_msgs/msg/Twist"]
     assert (
@@ -227,26 +242,28 @@ def test_node_info_shows_what_a_node_reads_writes_and_serves(verb: Verb, town: W
 
 
 def test_lists_count_and_write_json(verb: Verb, town: Wire) -> None:
-    assert int(verb(town, "service", "list", "-c").stdout) >= len(SERVICES)
-    rows = [
-        json.loads(line) for line in verb(town, "service", "list", "--json").stdout.splitlines()
-    ]
-    assert {"key": "resume", "type": "std_srvs/srv/Trigger"} in rows
-    names = [
-        json.loads(line)["node"]
-        for line in verb(town, "node", "list", "--json").stdout.splitlines()
-    ]
-    assert {"pose_service", "sim"} <= {*names}
-    assert verb(town, "node", "list", "-c").stdout == f"{len(names)}\n"
+    def rows(noun: str) -> list[dict[str, str]]:
+        listed = verb(town, noun, "list", "--json").stdout
+        return [json.loads(line) for line in listed.splitlines()]
+
+    wait_for(lambda: int(verb(town, "service", "list", "-c").stdout) >= len(SERVICES))
+    wait_for(lambda: {"key": "resume", "type": "std_srvs/srv/Trigger"} in rows("service"))
+    wait_for(lambda: {"pose_service", "sim"} <= {row["node"] for row in rows("node")})
+    wait_for(lambda: verb(town, "node", "list", "-c").stdout == f"{len(rows('node'))}\n")
 
 
 def test_the_graph_shows_writers_and_readers(verb: Verb, town: Wire, robot: Robot) -> None:
-    lines = verb(town, "graph").stdout.splitlines()
-    assert "sim -> odom -> pose_service, test" in lines
-    assert "next_goal: pose_service" in lines
-    dot = verb(town, "graph", "--dot").stdout
-    assert dot.startswith("digraph holozen {\n")
-    assert '  "node sim" -> "odom";\n' in dot
-    assert '  "odom" -> "node pose_service";\n' in dot
-    ends = [json.loads(line) for line in verb(town, "graph", "--json").stdout.splitlines()]
-    assert {"odom"} <= {end["key"] for end in ends if end["kind"] == "pub" and end["node"] == "sim"}
+    def shows(flags: tuple[str, ...], *parts: str) -> bool:
+        shown = verb(town, "graph", *flags).stdout
+        return all(part in shown for part in parts)
+
+    written, served = "sim -> odom -> pose_service, test\n", "next_goal: pose_service\n"
+    wait_for(lambda: shows((), written, served))
+    sim, service = '  "node sim" -> "odom";\n', '  "odom" -> "node pose_service";\n'
+    wait_for(lambda: shows(("--dot",), "digraph holozen {\n", sim, service))
+
+    def ends() -> set[tuple[str, str, str]]:
+        rows = map(json.loads, verb(town, "graph", "--json").stdout.splitlines())
+        return {(row["node"], row["kind"], row["key"]) for row in rows}
+
+    wait_for(lambda: ("sim", "pub", "odom") in ends())

@@ -42,7 +42,7 @@ def moved(robot: Robot, begin: float, end: float) -> list[bool]:
 def test_a_teleop_that_dies_while_driving_leaves_a_robot_that_stands(
     town: Wire, robot: Robot, number: int
 ) -> None:
-    with drives_fast(town, robot) as terminal:
+    with drives_fast(town, robot, "--mode", "latch") as terminal:
         terminal.process.signal(number)
         wait_for(lambda: state_of(terminal.process.pid) in "TZ")
         last = robot.newest()  # no command has left the teleop since before this one
@@ -54,7 +54,7 @@ def test_a_teleop_that_dies_while_driving_leaves_a_robot_that_stands(
 def test_a_teleop_that_wakes_up_after_its_key_timeout_does_not_drive_on(
     town: Wire, robot: Robot
 ) -> None:
-    with drives_fast(town, robot) as terminal:
+    with drives_fast(town, robot, "--key-timeout", "0.4") as terminal:
         terminal.process.signal(signal.SIGSTOP)
         stood = robot.stands()
         terminal.process.signal(signal.SIGCONT)
@@ -62,11 +62,11 @@ def test_a_teleop_that_wakes_up_after_its_key_timeout_does_not_drive_on(
         assert distance(stood, robot.pass_time(0.2)) < 1e-3
 
 
-def drives_fast(town: Wire, robot: Robot) -> Terminal:
-    terminal = town.terminal("teleop", "--speed", "2", "--key-timeout", "0.4")
+def drives_fast(town: Wire, robot: Robot, *flags: str) -> Terminal:
+    terminal = town.terminal("teleop", "--speed", "2", *flags)
     terminal.wait_for_text("listening")
-    # The test may get a link to the teleop later than the sim does.
-    terminal.hold_until("i", lambda: moves(robot.newest(), 2, 0, 0) and robot.commands.messages())
+    robot.knows("teleop")
+    terminal.hold_until("i", lambda: moves(robot.newest(), 2, 0, 0))
     return terminal
 
 

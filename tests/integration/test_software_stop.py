@@ -32,7 +32,8 @@ from holozen.transport.errors import ServiceError
 from holozen.transport.pubsub import Publisher
 from holozen.wire import key_for
 
-from .conftest import Verb, start_sim
+from .conftest import Verb, comes_to, start_sim
+from .processes import stopped
 from .robots import URDF, Robot, distance, moves, rests, speeds
 
 PERSON, SCRIPT, AUTOPILOT = "INTERACTIVE_HIGH", "DATA", "DATA_LOW"
@@ -147,15 +148,15 @@ def test_whatever_is_commanded_a_stopped_robot_stands(
                 "Rob/joint_command", JointState(name=WHEELS, velocity=[8.0] * 4), PERSON, "hands"
             )
         robot.odom.next(lambda odom: speeds(odom)[0] > 0.3)
-        assert verb(town, "stop", "Rob").stdout == "Rob is stopped\n"
+        assert stopped(verb(town, "stop", "Rob").stdout) == ["Rob"]
         wait_for(slows(robot), what="it to stand")
         robot.pass_time(1.0)  # what balances sways for a moment
         odoms = stands_for(robot, 0.5)
         assert abs(odoms[-1].pose.pose.orientation.x) < 0.1
-        status = robot.status()
+        status = robot.status_when(lambda status: status.refused.get("stopped", 0) > 100)
         assert status.stopped.startswith("stop@")
-        assert status.refused["stopped"] > 100
         assert (status.obeyed, status.held) == ("", True)
+        stands_for(robot, 0.1)
     entities.delete(robot.bus, "Rob")
 
 
@@ -195,15 +196,19 @@ def test_any_zenoh_tool_can_set_it_and_ask_for_it(
         value: dict[str, object] = json.loads(bytes(reply.ok.payload))
         return value
 
+    def setter() -> object:
+        return get("Fred/cmd_vel_status")["stopped"]
+
     assert get("Fred/stop") == {"success": True, "message": "stopped by an unknown caller"}
-    assert get("Fred/cmd_vel_status")["stopped"] == "an unknown caller"
+    comes_to("an unknown caller", setter)
     get("Fred/release")
-    assert get("Fred/cmd_vel_status")["stopped"] == ""
+    comes_to("", setter)
     sim.signal(signal.SIGSTOP)
     asked = [foreign.get(f"Fred/{verb}") for verb in ("release", "stop")]  # which are read together
     sim.signal(signal.SIGCONT)
     assert [len([*replies]) for replies in asked] == [1, 1]
-    assert get("Fred/cmd_vel_status")["stopped"] == "an unknown caller"
+    comes_to("an unknown caller", setter)
+    assert fred.status().stopped == "an unknown caller", "and it stays so"
 
 
 def test_a_stop_stops_the_robot_whatever_the_request_holds(
@@ -304,7 +309,7 @@ def test_one_command_stops_all_robots_beside_a_process_that_sleeps(
     sleeper.wait_for_line("goals")
     sleeper.signal(signal.SIGSTOP)
     done = verb(town, "stop")
-    assert {f"{name} is stopped" for name in robots} <= set(done.stdout.splitlines())
+    assert {*robots} <= {*stopped(done.stdout)}
     assert (done.returncode, done.stderr) == (0, "")
     assert all(robot.status().stopped for robot in robots.values())
     assert verb(town, "release").returncode == 0

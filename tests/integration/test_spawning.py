@@ -18,7 +18,7 @@ from holozen.robot.files.xacro import expand_xacro
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.errors import ServiceError
 
-from .conftest import Verb
+from .conftest import SPAWN, Verb
 from .robots import Robot, distance, place
 
 REPO = Path(__file__).parents[2]
@@ -55,16 +55,21 @@ def keys(bus: Bus) -> set[str]:
     }
 
 
+def patiently(words: tuple[str, ...]) -> tuple[str, ...]:
+    """The words of a verb, which waits longer than usual for a sim to spawn."""
+    return (*SPAWN, *words[1:]) if words[0] == "spawn" else words
+
+
 def done(verb: Verb, wire: Wire, *words: str) -> str:
     """What a verb prints that ends well."""
-    ended = verb(wire, *words)
+    ended = verb(wire, *patiently(words))
     assert (ended.returncode, ended.stderr) == (0, "")
     return ended.stdout
 
 
 def refused(verb: Verb, wire: Wire, *words: str) -> str:
     """The one line of a verb that ends badly."""
-    ended = verb(wire, *words)
+    ended = verb(wire, *patiently(words))
     assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (1, "", 1), ended
     return ended.stderr
 

@@ -57,15 +57,20 @@ def test_a_suspended_launch_drives_no_robot_and_goes_on_with_its_job(
     shell.type(" ".join(command("launch", str(file), *wire.flags)) + "\r")
     robot.odom.next(lambda odom: moves(odom, 0.4, 0, 0))
     driving = int(pid.read_text())
-    shell.type(CTRL_Z)
-    robot.odom.next(rests)
+
+    def suspend() -> None:
+        # a driver that a busy machine holds up lets its robot stand too
+        shell.type(CTRL_Z)
+        wait_for(lambda: state_of(driving) == "T", what="the driver to be suspended")
+        robot.odom.next(rests)
+
+    suspend()
     odoms = robot.odom.from_now()
     robot.pass_time(1.0)
     assert all(map(rests, odoms.messages()))
     shell.type("fg\r")
     robot.odom.next(lambda odom: moves(odom, 0.4, 0, 0))
-    shell.type(CTRL_Z)
-    robot.odom.next(rests)
+    suspend()
     shell.type("kill -9 %1\r")
     wait_for(lambda: state_of(driving) == "Z", what="the end of what a killed launch had started")
     assert rests(robot.newest())

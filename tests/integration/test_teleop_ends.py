@@ -37,6 +37,7 @@ sys.exit(teleop.main(sys.argv[1:]))
 def driving(robot: Robot, terminal: Terminal) -> Terminal:
     """The teleop in this terminal, while it drives."""
     terminal.wait_for_text("listening")
+    robot.knows("teleop")
     terminal.hold_until("i", lambda: moves(robot.newest(), 0.5, 0, 0))
     return terminal
 
@@ -134,6 +135,7 @@ def test_an_exception_stops_the_robot_and_is_one_error_line(
     script.write_text(BROKEN.format(root=str(ROOT), statement=statement))
     with Terminal([sys.executable, str(script), *DRIVES_ON, *town.flags]) as terminal:
         terminal.wait_for_text("listening")
+        robot.knows("teleop")
         commands = robot.commands.from_now()
         terminal.hold_until("i", lambda: terminal.process.returncode is not None)
         assert terminal.process.wait() == 1

@@ -1,7 +1,8 @@
 """`holozen topic` beside a sim that runs: list, info, echo, hz, pub, and their errors."""
 
 import json
-import subprocess
+import os
+import re
 
 import pytest
 import zenoh
@@ -11,10 +12,11 @@ from holozen.messages import TriggerReply, TriggerRequest
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 
-from .conftest import Verb
+from .conftest import LATE, Verb, comes_to
 from .processes import assert_one_line
 from .robots import Robot, moves, planar
 
+SLOW = "no new messages"  # what is reported where a busy machine lets nothing come for a second
 TOPICS = {
     "clock": "rosgraph_msgs/msg/Clock",
     "cmd_vel": "geometry_msgs/msg/Twist",
@@ -30,21 +32,26 @@ TOPICS = {
 
 
 def test_list_names_every_topic_once(verb: Verb, town: Wire, robot: Robot) -> None:
-    assert verb(town, "topic", "list").stdout.split() == sorted(TOPICS)
-    lines = verb(town, "topic", "list", "-t").stdout.splitlines()
-    assert lines == [f"{key} [{kind}]" for key, kind in sorted(TOPICS.items())]
+    comes_to(sorted(TOPICS), lambda: verb(town, "topic", "list").stdout.split())
+    comes_to(
+        [f"{key} [{kind}]" for key, kind in sorted(TOPICS.items())],
+        lambda: verb(town, "topic", "list", "-t").stdout.splitlines(),
+    )
     hidden = "simulate_steps/_action/feedback"
-    assert hidden in verb(town, "topic", "list", "--include-hidden-topics").stdout.split()
+    every = ("topic", "list", "--include-hidden-topics")
+    wait_for(lambda: hidden in verb(town, *every).stdout.split())
 
 
 def test_info_shows_the_type_and_the_endpoints(verb: Verb, town: Wire, robot: Robot) -> None:
-    lines = verb(town, "topic", "info", "cmd_vel").stdout.splitlines()
-    assert lines[0] == "Type: geometry_msgs/msg/Twist"
-    assert lines[1] == "Publisher count: 1"
-    assert lines[2].startswith("  test (")
-    assert lines[3] == "Subscription count: 2"
-    assert sorted(line.split()[0] for line in lines[4:-1]) == ["sim", "test"]
-    assert lines[-1].startswith("Obeyed: ")
+    def shown() -> list[str]:
+        """Without sessions, who is obeyed, and the order of the subscribers."""
+        lines = verb(town, "topic", "info", "cmd_vel").stdout.splitlines()
+        words = [line.partition("(")[0].strip() for line in lines if not line.startswith("Obeyed")]
+        return [*words[:4], *sorted(words[4:])]
+
+    expected = ["Type: geometry_msgs/msg/Twist", "Publisher count: 1", "test"]
+    comes_to([*expected, "Subscription count: 2", "sim", "test"], shown)
+    wait_for(lambda: "\nObeyed: " in verb(town, "topic", "info", "cmd_vel").stdout)
 
 
 def test_echo_prints_as_ros_does(verb: Verb, town: Wire, robot: Robot) -> None:
@@ -113,42 +120,44 @@ def test_echo_shows_what_foreign_nodes_put(
     assert echo.out == f"{shown}\n---\n"
 
 
-@pytest.mark.parametrize(
-    ("flags", "shown"),
-    [
-        ("foreign --once", "(deleted)\n---\n"),
-        ("* --once --json", '{"key": "foreign", "value": {"deleted": true}}\n'),
-        ("foreign --field x --timeout 1", ""),
-    ],
-)
-def test_echo_shows_that_a_key_was_deleted(wire: Wire, flags: str, shown: str) -> None:
-    session, echo = wire.bus("foreign").session, wire.start("topic", "echo", *flags.split())
+def test_echo_shows_that_a_key_was_deleted(wire: Wire) -> None:
+    session = wire.bus("foreign").session
+    shown = {
+        "foreign --once": "(deleted)\n---\n",
+        "* --once --json": '{"key": "foreign", "value": {"deleted": true}}\n',
+        "foreign --field x --timeout 1": "",
+    }
+    echoes = {flags: wire.start("topic", "echo", *flags.split()) for flags in shown}
 
     def ended() -> bool:
         session.delete("foreign")
-        return echo.returncode is not None
+        return all(echo.returncode is not None for echo in echoes.values())
 
     wait_for(ended)
-    assert echo.out == shown
+    assert {flags: echo.out for flags, echo in echoes.items()} == shown
 
 
-@pytest.mark.parametrize("verb", ["echo odom", "hz odom"])
-def test_a_reader_that_has_seen_enough_ends_it_quietly(town: Wire, robot: Robot, verb: str) -> None:
-    words = command("topic", *verb.split(), *town.flags)
-    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        assert process.stdout is not None and process.stderr is not None
-        process.stdout.readline()
-        process.stdout.close()
+def test_a_reader_that_has_seen_enough_ends_it_quietly(town: Wire, robot: Robot) -> None:
+    for verb in ("echo", "hz"):
+        reading, writing = os.pipe()
+        with open(reading, "rb") as reader:
+            with open(writing, "wb") as output:
+                process = town.start("topic", verb, "odom", stdout=output)
+            reader.readline()
         assert process.wait() == 0
-        assert process.stderr.read() == b""
+        assert all(line.startswith(SLOW) for line in process.err.splitlines()), process.err
 
 
 def test_hz_shows_the_rate(town: Wire, robot: Robot) -> None:
     hz = town.start("topic", "hz", "odom")
-    hz.wait_for_line("std dev")
-    assert 5 < float(hz.out.split()[2]) < 75  # of 50; a busy machine loses time
+
+    def shown() -> list[float]:
+        return [float(rate) for rate in re.findall(r"^average rate: (\S+)", hz.out, re.M)]
+
+    # a busy machine loses time, and catches up
+    wait_for(lambda: any(5 < rate < 75 for rate in shown()), what=lambda: f"50 Hz; {shown()}")
     assert hz.interrupt() == 0
-    assert hz.err == ""
+    assert all(line.startswith(SLOW) for line in hz.err.splitlines()), hz.err
 
 
 def test_hz_of_a_silent_key_reports_it(town: Wire, robot: Robot) -> None:
@@ -160,7 +169,8 @@ def test_pub_drives_until_ctrl_c_and_stops_the_robot_then(town: Wire, robot: Rob
     pub = town.start("topic", "pub", "cmd_vel", '{"linear": {"x": 0.3}}')
     robot.odom.next(lambda odom: moves(odom, 0.3, 0, 0))
     robot.pass_time(0.7)
-    assert moves(robot.newest(), 0.3, 0, 0)
+    robot.odom.next(lambda odom: moves(odom, 0.3, 0, 0))
+    robot.knows("topic_pub")
     assert pub.interrupt() == 0
     robot.stands()
     robot.wait_for_stop_command()
@@ -205,14 +215,17 @@ def test_pub_reads_a_value_from_standard_input(town: Wire, robot: Robot) -> None
 def test_pub_sends_as_often_as_requested_and_stops_after_more_than_one(
     verb: Verb, town: Wire, robot: Robot, words: list[str], count: int
 ) -> None:
-    commands = robot.commands.from_now()
+    commands, late = robot.commands.from_now(), robot.status().refused.get("late", 0)
     done = verb(town, "topic", "pub", "cmd_vel", '{"linear": {"x": 0.3}}', *words)
-    # on a busy machine
-    assert done.returncode == 0 or "not obeyed: late" in done.stderr, done.stderr
+    assert done.returncode == 0 or LATE in done.stderr, done.stderr
     wait_for(lambda: len(commands.messages()) >= count, what="that many commands")
     robot.stands()
     sent = [planar(command)[0] for command in commands.messages()]
-    assert sent == ([0.3] if count == 1 else [0.3] * 5 + [0.0] * STOPS)
+    if count == 1:  # and again for each that a busy machine held up
+        late = robot.status().refused.get("late", 0) - late
+        assert 1 <= len(sent) <= 1 + late and set(sent) == {0.3}
+    else:
+        assert sent == [0.3] * 5 + [0.0] * STOPS
 
 
 @pytest.mark.parametrize(

@@ -2,21 +2,20 @@
 itself.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
 
 from holozen.messages import CommandStatus, Twist
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.errors import ServiceError
-from holozen.wire import COMMAND_SILENCE, PRIORITY_OF
+from holozen.wire import PRIORITY_OF
 
 from .conftest import Verb
 from .processes import assert_one_line
 from .robots import Robot, moves, rests
 
 PERSON, SCRIPT, AUTOPILOT = "INTERACTIVE_HIGH", "DATA", "DATA_LOW"
-SILENCE = 2.0  # s
 
 Hand = Callable[[float], None]
 
@@ -25,15 +24,6 @@ def hand(wire: Wire, node: str, priority: str) -> Hand:
     """A source that commands forward speeds."""
     publisher = wire.bus(node).publisher("cmd_vel", Twist, priority)
     return lambda x: publisher.put(Twist.planar(x))
-
-
-@pytest.fixture
-def patient(robot: Robot) -> Iterator[Robot]:
-    """The robot, for tests in which a source has to stay fresh on a busy machine: it stops after
-    SILENCE only.
-    """
-    yield robot.wait_longer(SILENCE)
-    robot.wait_longer(COMMAND_SILENCE)
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +53,7 @@ def drive(
             other(speed)
         hand(x)
         goes, status = moves(robot.newest(), x, 0, 0), robot.last_status()
-        return status if goes and status and status.obeyed.startswith(obeyed) else None
+        return status if goes and status.obeyed.startswith(obeyed) else None
 
     status = wait_for(going, what=lambda: f"the robot to go at {x}: {robot.status()}")
     assert status

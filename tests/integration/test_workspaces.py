@@ -5,9 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from holozen import entities
 from holozen.testing import Wire
 from tests.students import MIXED, ROS_1, ROS_2, hb_bot, workspace
 
+from .conftest import SPAWN, Verb
 from .robots import Robot, distance, place
 
 BOTS = {
@@ -33,15 +35,23 @@ BOTS = {
 }
 
 
+@pytest.fixture(scope="module")
+def empty(town: Wire) -> Wire:
+    """A wire with a sim without robots."""
+    town.start("sim", "--empty", "--rtf", "4").wait_for_line("no robot yet")
+    return town
+
+
 @pytest.mark.parametrize("bot", BOTS)
-def test_it_is_spawned_and_drives_by_its_plugin(wire: Wire, tmp_path: Path, bot: str) -> None:
+def test_it_is_spawned_and_drives_by_its_plugin(
+    verb: Verb, empty: Wire, tmp_path: Path, bot: str
+) -> None:
     folder, text, package, ends = BOTS[bot]
     file = workspace(tmp_path, folder, text, package, ends)
-    wire.start("sim", "--empty", "--rtf", "4").wait_for_line("no robot yet")
-    done = wire.run("spawn", str(file), "--name", "Fred")
+    done = verb(empty, *SPAWN, str(file), "--name", "Fred")
     assert (done.returncode, done.stdout) == (0, "Fred listens on Fred/cmd_vel\n")
     assert done.stderr.count("\n") == ("chasis" in done.stderr)
-    fred = Robot(wire.bus(), "Fred").wait_longer()
+    fred = Robot(empty.bus(), "Fred").wait_longer()
     start = fred.stands()
     fred.drive(0.3, 0.4, until=lambda odom: distance(odom, start) > 1)
     end = fred.stop()
@@ -49,3 +59,5 @@ def test_it_is_spawned_and_drives_by_its_plugin(wire: Wire, tmp_path: Path, bot:
     fred.drive(0, 0, 1, until=lambda odom: place(odom)[2] > 1)
     turned = fred.stop()
     assert distance(end, turned) < 1e-3
+    entities.delete(fred.bus, "Fred")
+    fred.bus.close()

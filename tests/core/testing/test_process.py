@@ -6,12 +6,13 @@ import json
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from holozen.testing import Process, Terminal, wait_for
+from holozen.testing import Process, Terminal, Wire, wait_for
 from holozen.testing.wire import command
 from tests.present import needs
 
@@ -90,3 +91,13 @@ def test_what_is_forked_ends_as_it_is_told_and_with_its_test(
         lambda: not Path(f"/proc/{int(done.stdout)}").exists(),
         what="the end of what a killed test had started",
     )
+
+
+def test_a_verb_is_forked_whatever_another_has_set_in_the_test_itself(
+    wire: Wire, call: Callable[..., object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    for _ in range(2):
+        echo = wire.start("topic", "echo", "nothing")
+        assert "fork_server" in Path(f"/proc/{echo.pid}/cmdline").read_text()
+        call("topic", "list", *wire.flags)
