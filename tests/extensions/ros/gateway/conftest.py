@@ -83,17 +83,15 @@ class Theirs:
         found: list[Any] = []
         qos = QosProfile(durability=QosDurability.TRANSIENT_LOCAL, history_depth=1)
 
-        def asked() -> float:
-            self.subscriber(topic, kind, found.append, qos=qos)
-            return time.monotonic()
+        due = 0.0
 
         def has_come() -> bool:
-            nonlocal last
-            if not found and time.monotonic() > last + ASK_AGAIN:
-                last = asked()
+            nonlocal due
+            if not found and time.monotonic() > due:
+                self.subscriber(topic, kind, found.append, qos=qos)
+                due = time.monotonic() + ASK_AGAIN
             return bool(found)
 
-        last = asked()
         wait_for(has_come, what=f"the last message of {topic}")
         return found[0]
 

@@ -397,7 +397,7 @@ def test_nothing_goes_round_between_the_two_sides(wire: Wire, theirs: "Theirs") 
             for received in iter(reader.try_recv, None)
             if received.message
         )
-        return min(sum(x >= 1000 for x in side) for side in (came, seen)) > 20
+        return all(sum(x >= 1000 for x in side) > 20 for side in (came, seen))
 
     wait_for(marked, what="our marks on both sides")
     for side in ([message.linear.x for message in there], seen):
