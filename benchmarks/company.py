@@ -84,8 +84,8 @@ def until(ready: Callable[[], object], every: float = 0.05) -> None:
 def wait_for_odom(endpoint: str) -> None:
     """Wait until a robot publishes odom at `endpoint`."""
     with Bus("waits", guest(endpoint)) as bus:
-        assert bus.latest("odom", Odometry).wait(0, timeout=20), (
-            "the robot did not come up within 20 s"
+        assert bus.latest("odom", Odometry).wait(0, timeout=PATIENCE), (
+            f"the robot did not come up within {PATIENCE:g} s"
         )
 
 

@@ -231,10 +231,12 @@ def measured(
 
 
 def main() -> int:
-    args = parser("key_to_motion", __doc__).parse_args()
+    flags = parser("key_to_motion", __doc__)
+    flags.add_argument("--terminal", action="store_true", help="leave out the page in Chromium")
+    args = flags.parse_args()
     sizes = (1, 1, 2) if args.quick else (10, 40, 25)
     cases = measured("", operator(), *sizes)
-    if shutil.which("chromium"):
+    if shutil.which("chromium") and not args.terminal:
         cases += measured("in the page, ", page_operator(), *sizes)
     publish("key_to_motion", cases, args.json)
     for case in cases:

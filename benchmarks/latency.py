@@ -201,7 +201,7 @@ def compare(
 def main() -> int:
     args = parser("latency", __doc__).parse_args()
     a, b, c = meeting_point(), meeting_point(), meeting_point()
-    turns, flat, paced = (2, 100, 5) if args.quick else (40, 500, 25)
+    turns, flat, paced = (1, 100, 5) if args.quick else (40, 500, 25)
     with (
         beside(answer_ours, a),
         beside(answer_raw, b),

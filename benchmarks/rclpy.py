@@ -137,7 +137,7 @@ def compare(turns: int, count: int) -> tuple[list[Case], dict[str, int]]:
 
 def main() -> int:
     args = parser("rclpy", __doc__).parse_args()
-    cases, lost = compare(*((2, 200) if args.quick else (20, 2000)))
+    cases, lost = compare(*((1, 200) if args.quick else (20, 2000)))
     publish("rclpy", cases, args.json, lost=lost)
     for side, count in lost.items():
         print(f"lost, {side.replace('_', ' ')}: {count}")

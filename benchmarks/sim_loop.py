@@ -18,7 +18,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 from xml.etree import ElementTree
 
-from benchmarks.company import beside, guest, host, meeting_point
+from benchmarks.company import PATIENCE, beside, guest, host, meeting_point
 from benchmarks.report import Case, parser, publish
 from holozen import data
 from holozen.bus import Bus
@@ -189,10 +189,10 @@ def main() -> int:
         compare("warm up", sides, 1, steps)
         cases = [compare("idle", sides, turns, steps)]
         with beside(drive, endpoint):
-            pilot, deadline = bus.latest("cmd_vel", Twist), time.monotonic() + 10.0
+            pilot, deadline = bus.latest("cmd_vel", Twist), time.monotonic() + PATIENCE
             # it commands once it has heard the sim's beat, which the loop sends
             while not pilot.count:
-                assert time.monotonic() < deadline, "the pilot did not come up within 10 s"
+                assert time.monotonic() < deadline, "the pilot did not come up"
                 sides[0](1)
             cases.append(compare("driving", sides, turns, steps))
             shares = profile(sides[0], steps * 5) if args.profile else {}

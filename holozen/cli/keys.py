@@ -245,7 +245,6 @@ Row = dict[str, Any]
 
 # of CommandSource
 SOURCE = {"source": str, "priority": str, "rate": int | float, "obeyed": bool, "held": bool}
-ASK = 0.5  # s
 ENOUGH = 200  # samples, after which `info -v` stops listening
 
 
@@ -294,10 +293,7 @@ def _row(end: Endpoint) -> Row:
 
 def _status(bus: Node, name: str, endpoints: list[Endpoint]) -> Row:
     """The sim's status of the commands on a key; empty if it publishes none."""
-    if not on_key(endpoints, f"{name}_status", "pub"):
-        return {}
-    answers = bus.ask(f"{name}_status", ASK)  # publishers answer queries with their last message
-    sample = next((answer for answer in answers if isinstance(answer, Sample)), None)
+    sample = next(bus.last_messages(on_key(endpoints, f"{name}_status", "pub")), None)
     status = decode(sample.payload, sample.encoding) if sample else {}
     return status if isinstance(status, dict) else {}
 

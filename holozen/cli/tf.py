@@ -19,6 +19,7 @@ from holozen.frames import Frames
 from holozen.process import stop_event
 from holozen.rotation import Transform, to_rpy
 from holozen.suggest import listed
+from holozen.transport.graph import on_key
 from holozen.transport.samples import Sample
 
 if TYPE_CHECKING:
@@ -80,8 +81,9 @@ def _held(bus: Bus, key: str) -> Iterable[TFMessage]:
     """The last messages of all publishers of a key, since static transforms are sent only once."""
     from holozen.messages import TFMessage, codec
 
-    bus.endpoints()  # returns once the running nodes are discovered
-    for answer in bus.ask_all(key, ASK):
+    ours = bus.last_messages(on_key(bus.endpoints(), key, "pub"))
+    # also foreign ones, which announce nothing
+    for answer in (*ours, *bus.ask_all(key, ASK)):
         if isinstance(answer, Sample):
             try:
                 yield codec.decode(answer.payload, answer.encoding, (TFMessage,), tolerant=True)

@@ -50,8 +50,9 @@ D = TypeVar("D", bound=Declared)
 ROLL_CALL = 2.0  # s for all nodes to send their tokens; a sim with hundreds of robots has thousands
 WITNESSES = 1.0  # s for others to tell of robots and sims that hang
 DEFINITION_WAIT = 0.5  # s for a node to be found that answers
-LAST_WAIT = 0.5  # s for publishers to answer with their last messages
 DEFINITION_TIMEOUT = 2.0  # s for its answer
+LAST_WAIT = 0.5  # s for a publisher to be found that answers with its last message
+LAST_TIMEOUT = 2.0  # s for its answer; a busy machine takes long
 # samples; Zenoh takes the memory for all of them at once, and without it aborts the process
 MAX_DEPTH = 1 << 24
 LONGEST_NAME = 255  # characters of a node's name, as in ROS
@@ -368,7 +369,7 @@ class Node:
         for one in publishers:
             found = False
             while not found:  # on a new link a node's tokens may be known before its queryables
-                for reply in self.ask_all(one.key, LAST_WAIT, replier=one.session):
+                for reply in self.ask_all(one.key, LAST_TIMEOUT, replier=one.session):
                     if not isinstance(reply, bytes):
                         found = True
                         yield reply

@@ -215,7 +215,7 @@ def test_the_sim_starts_from_the_wheel_and_publishes_odom(full: Path, wire: Wire
     with Process([str(holozen(full)), "sim", *wire.flags], env=CLEAN) as sim:
         wait_for(lambda: odom.count > 3, what=lambda: sim.err)
         assert sim.terminate() == 0
-        engine, listens = sim.err.splitlines()
+        engine, listens, *_ = sim.err.splitlines()  # a busy machine is told of its slowness
         assert engine == f"sim: the engine is {choose()}"
         assert listens == "sim: hb_bot listens on cmd_vel"
 
@@ -235,7 +235,7 @@ rclpy.spin(node)
 def test_a_first_hour_with_the_wheel(full: Path, wire: Wire, tmp_path: Path) -> None:
     """up, view, new, check, run and record."""
     with Process([str(holozen(full)), "up", *wire.flags], env=CLEAN) as up:
-        up.wait_for_line("4 goals from square")
+        up.wait_for_line("4 goals from square", within=60)
         with Process([str(holozen(full)), "view", "--port", "0", *wire.flags], env=CLEAN) as view:
             view.wait_for_line("http://127.0.0.1:")
             assert view.terminate() == 0
@@ -247,17 +247,10 @@ def test_a_first_hour_with_the_wheel(full: Path, wire: Wire, tmp_path: Path) -> 
         assert "heard footprint_link" in good(
             holozen(full), "run", *wire.flags, "listener.py", cwd=tmp_path
         )
-        good(
-            holozen(full),
-            "record",
-            "odom",
-            "-o",
-            "drive",
-            "--max-duration",
-            "1",
-            *wire.flags,
-            cwd=tmp_path,
-        )
+        words = [str(holozen(full)), "record", "odom", "-o", str(tmp_path / "drive"), "--json"]
+        with Process([*words, *wire.flags], env=CLEAN) as recorder:
+            wait_for(lambda: re.search(r'"messages": [1-9]', recorder.out), what="odom")
+            assert recorder.interrupt() == 0
         assert "odom" in good(holozen(full), "bag", "info", "drive.mcap", cwd=tmp_path)
         assert up.interrupt() == 0
 

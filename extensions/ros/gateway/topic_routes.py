@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import count
 from typing import Any
@@ -57,17 +57,19 @@ class TopicRoutes:
             for one in self._sides.theirs.values()
             if one.kind == "sub" and self._sides.is_known(one)
         }
-        writers: dict[str, list[str]] = {}
+        writers: dict[str, list[graphs.Endpoint]] = {}
         for one in ours:
             if one.kind == "pub":
-                writers.setdefault(one.key, []).append(one.session)
+                writers.setdefault(one.key, []).append(one)
         for one in ours:
             found = self._sides.exported(one) if one.kind == "pub" else None
             if found and (found.latched or (found.topic, found.type) in read):
                 # A latched message may have been put before this session knew its publisher: each
                 # new one is asked.
                 asked = tuple(writers[found.topic]) if found.latched else ()
-                wanted["out", found.topic, found.type, asked] = partial(self._carry_out, found)
+                wanted["out", found.topic, found.type, asked] = partial(
+                    self._carry_out, found, asked
+                )
         for theirs in self._sides.theirs.values():
             if (
                 theirs.kind == "pub"
@@ -77,8 +79,10 @@ class TopicRoutes:
                 wanted["in", theirs.topic, theirs.type] = partial(self._carry_in, theirs)
         return wanted
 
-    def _carry_out(self, found: rmw.Endpoint) -> Ends:
-        """Our samples, in CDR, to ROS 2."""
+    def _carry_out(self, found: rmw.Endpoint, asked: Iterable[graphs.Endpoint]) -> Ends:
+        """Our samples, in CDR, to ROS 2; first the last messages of the publishers that are
+        `asked`.
+        """
         interface = self._sides.registry.find(found.type)
         publisher, put_bytes = self.publisher(found)
 
@@ -94,11 +98,8 @@ class TopicRoutes:
             self._sides.reader(self._sides.bus.session, found.topic, put),
             quietly(publisher.undeclare),
         ]
-        # All of them: alone, a service of the same name, such as the sim's robot_description, would
-        # be asked.
-        for sample in self._sides.bus.ask_all(found.topic, 0.5) if found.latched else ():
-            if isinstance(sample, Sample):
-                put(sample)
+        for sample in self._sides.bus.last_messages(asked):
+            put(sample)
         return ends
 
     def publisher(self, found: rmw.Endpoint) -> tuple[Any, Callable[[bytes], None]]:

@@ -13,8 +13,20 @@ from holozen.cli.publish import LEFT
 from holozen.command.feedback import HELD, ONLY_TURNS, SILENT, STOP_FIRST, verdict, verdict_on_part
 from holozen.messages import CommandSource, CommandStatus, Twist
 from holozen.testing import Wire, wait_for
+from holozen.testing.process import PATIENCE
 
 Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy machine is waited for: each verdict comes here."""
+    for name in ("publish.VERDICT_WITH_STATUS", "publish.VERDICT_WITHOUT_STATUS"):
+        monkeypatch.setattr(f"holozen.cli.{name}", PATIENCE)
+    for name in ("FRESH", "HOLDING"):
+        monkeypatch.setattr(f"holozen.command.feedback.{name}", PATIENCE)
+
+
 ME = "topic_pub@a1b2c3"
 TELEOP = "teleop@d4e5f6"
 
@@ -173,7 +185,7 @@ def test_a_stop_that_is_refused_where_nothing_drives_is_no_failure(wire: Wire, r
 def test_a_robot_that_is_gone_is_reported(
     wire: Wire, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("holozen.command.feedback.FRESH", 0.2)
+    monkeypatch.setattr("holozen.command.feedback.FRESH", 0.05)
     sim = wire.bus("sim")
     commands, statuses = (
         sim.subscribe("cmd_vel", Twist),

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from holozen.bus import Bus
-from holozen.cli import main
+from holozen.cli import completion, main
 from holozen.cli.completion import SAFE, SCRIPTS
 from holozen.messages import NextGoalReply, NextGoalRequest, Odometry, Twist
 from holozen.testing import Wire
@@ -21,10 +21,13 @@ HERE = "<here>"
 
 
 @pytest.fixture
-def complete(wire: Wire, capsys: pytest.CaptureFixture[str]) -> Complete:
+def complete(
+    wire: Wire, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> Complete:
     """What is offered for the last of some words; HERE among them stands for the flags of this
-    wire.
+    wire. It waits longer for the first node than for a person, who would press Tab again.
     """
+    monkeypatch.setattr(completion, "PATIENCE", 2.0)
 
     def complete(*words: str) -> list[str]:
         assert (

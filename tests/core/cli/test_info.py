@@ -9,8 +9,10 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from holozen.bus import Bus
+from holozen.cli import keys
 from holozen.messages import CommandSource, CommandStatus, Odometry, Twist
 from holozen.testing import Wire
+from holozen.testing.process import PATIENCE
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -85,7 +87,11 @@ def test_a_status_that_is_none_is_passed_over(sim: Bus, run: Run) -> None:
         assert (code, out.splitlines()[0]) == (0, "Type: geometry_msgs/msg/Twist")
 
 
-def test_verbose_shows_priority_encoding_and_delivery(wire: Wire, run: Run) -> None:
+def test_verbose_shows_priority_encoding_and_delivery(
+    wire: Wire, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(keys, "ENOUGH", 1)
+    monkeypatch.setattr(keys, "LISTEN", PATIENCE)
     publisher = wire.bus("sim").publisher("odom", Odometry, priority="DATA_LOW")
     done = threading.Event()
 

@@ -17,6 +17,7 @@ from holozen.bus import Bus
 from holozen.cli import stop as stop_module
 from holozen.messages import CommandStatus, TriggerReply, TriggerRequest
 from holozen.testing import Process, Wire, wait_for
+from holozen.testing.process import PATIENCE
 from holozen.testing.wire import command
 from holozen.transport.connection import GROUP
 from holozen.transport.errors import ServiceError
@@ -24,6 +25,7 @@ from holozen.transport.services import Server
 from holozen.wire import key_for
 
 Run = Callable[..., tuple[int, str, str]]
+LONG = ("--timeout", f"{0.8 * PATIENCE:g}")
 
 
 class Robots:
@@ -61,6 +63,23 @@ class Robots:
 
         return answer
 
+    @contextmanager
+    def joined_later(self, key: str) -> Iterator[None]:
+        """A sim with this key joins once another one was called."""
+        bus = self.wire.bus("late")  # a busy machine takes long to open one
+
+        def join() -> None:
+            self.first_called.wait()
+            self.add(key, bus=bus)
+
+        late = threading.Thread(target=join)
+        late.start()
+        try:
+            yield
+        finally:
+            self.first_called.set()
+            late.join()
+
     def drop_tokens(self) -> None:
         """Go on serving, but announce nothing."""
         for server in self._servers:
@@ -87,6 +106,12 @@ def repeated(bus: Bus, status: CommandStatus, after: float = 0.0) -> Iterator[No
     finally:
         end.set()
         thread.join()
+
+
+@pytest.fixture
+def run(run: Run) -> Run:
+    """The verb waits long for what a busy machine does late, unless a test says how long."""
+    return lambda *words: run(*words, *([] if "--timeout" in words else LONG))
 
 
 @pytest.fixture
@@ -119,28 +144,34 @@ def test_all_are_stopped_although_the_reader_has_gone(robots: Robots) -> None:
     reader, writer = os.pipe()
     os.close(reader)
     done = subprocess.run(
-        command("stop", *robots.wire.flags), stdout=writer, stderr=subprocess.PIPE, timeout=60
+        command("stop", *LONG, *robots.wire.flags),
+        stdout=writer,
+        stderr=subprocess.PIPE,
+        timeout=60,
     )
     os.close(writer)
     assert (done.returncode, done.stderr) == (0, b"")
     assert robots.keys() == {"Ann/stop", "Bob/stop"}
 
 
-@pytest.mark.parametrize(
-    ("name", "expected"), [("Fred", {"Fred/stop"}), ("", {"Ann/stop", "Fred/stop"})]
-)
-def test_one_that_is_met_later_than_others_is_stopped_too(
-    robots: Robots, run: Run, name: str, expected: set[str]
+def test_one_that_is_met_later_than_others_is_stopped_too(robots: Robots, run: Run) -> None:
+    robots.add("Ann/stop")
+    with robots.joined_later("Fred/stop"):
+        assert run("stop")[0] == 0
+    assert robots.keys() == {"Ann/stop", "Fred/stop"}
+
+
+def test_one_that_is_named_and_met_later_is_stopped(
+    robots: Robots, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(stop_module, "NOTICE", PATIENCE)
     robots.add("Ann/stop")
     bus = robots.wire.bus("late")  # a busy machine takes long to open one
     late = threading.Timer(0.6, robots.add, ["Fred/stop"], {"bus": bus})
     late.start()
-    try:
-        assert run("stop", *[name] * bool(name))[0] == 0
-        assert robots.keys() == expected
-    finally:
-        late.join()
+    assert run("stop", "Fred")[0] == 0
+    late.join()
+    assert robots.keys() == {"Fred/stop"}
 
 
 @pytest.mark.parametrize(
@@ -156,10 +187,9 @@ def test_a_robot_whose_token_is_lost_among_forged_ones_is_stopped(
     _forged = [
         foreign.announce("srv", TriggerReply.ROS, f"forged{number}/stop") for number in range(100)
     ]
-    assert (
-        f"{place or 'the robot at the root'} is stopped"
-        in run("stop", *names, "--timeout", "2")[1].splitlines()
-    )
+    line = f"{place or 'the robot at the root'} is stopped"
+    # On a busy machine it may be met too late.
+    wait_for(lambda: line in run("stop", *names, "--timeout", "1")[1].splitlines())
     assert robots.keys() == {key}
 
 
@@ -219,6 +249,7 @@ def test_the_robot_at_the_root_is_waited_for_where_its_name_comes_late(
     robots: Robots, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(stop_module, "QUIET", 0.0)
+    monkeypatch.setattr(stop_module, "NOTICE", PATIENCE)
     with repeated(robots.add("stop", "lab/Fred/stop"), CommandStatus(name="hb_bot"), after=1.0):
         assert run("stop", "hb_bot") == (0, "hb_bot is stopped\n", "")
     assert robots.keys() == {"stop"}
@@ -263,16 +294,8 @@ def test_a_sim_that_is_met_after_another_confirmed_the_same_robot_is_asked_too(
     robots: Robots, run: Run, names: tuple[str, ...]
 ) -> None:
     robots.add("Fred/stop")
-    bus = robots.wire.bus("late")  # a busy machine takes long to open one
-
-    def add() -> None:
-        robots.first_called.wait()
-        robots.add("Fred/stop", bus=bus)
-
-    late = threading.Thread(target=add)
-    late.start()
-    assert run("stop", *names) == (0, "Fred is stopped\n", "")
-    late.join()
+    with robots.joined_later("Fred/stop"):
+        assert run("stop", *names) == (0, "Fred is stopped\n", "")
     assert len(robots.called) == 2
 
 
@@ -315,14 +338,13 @@ def test_a_name_that_does_not_exist_names_those_that_do(
 ) -> None:
     monkeypatch.setattr(stop_module, "NOTICE", 0.5)
     robots.add("Fred/stop", "stop")
-    for name in ("Frd", "*", "**", "a b", "?", "a//b"):
-        robots.called.clear()
+    for name in ("Frd", "**", "a//b"):
         expected = (
             f"holozen stop: there is no robot {name!r}; there are: the robot at the root, Fred\n"
         )
         assert run("stop", name) == (1, "", expected)
         assert robots.called == set()
-        assert run("stop", name, "/Fred/")[:2] == (1, "Fred is stopped\n")
+    assert run("stop", "Frd", "/Fred/")[:2] == (1, "Fred is stopped\n")
 
 
 def test_without_a_robot_it_reports_that(robots: Robots, run: Run) -> None:

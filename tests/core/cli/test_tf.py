@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable
 
 import pytest
+import zenoh
 
 from holozen.frames import Frames
 from holozen.messages import (
@@ -16,6 +17,7 @@ from holozen.messages import (
     TransformStamped,
     Vector3,
 )
+from holozen.messages.codec import encode
 from holozen.rotation import from_rpy
 from holozen.testing import Wire
 
@@ -104,6 +106,26 @@ def test_echo_prints_what_tf2_echo_prints(wire: Wire, run: Run) -> None:
         "lidar",
         pytest.approx(QUARTER),
     )
+
+
+def test_static_transforms_are_asked_for_until_their_node_answers(wire: Wire, run: Run) -> None:
+    """On a new link its token may be known before what answers."""
+    bus, asked = wire.bus("robot", lasting=True), list[str]()
+
+    def answer(query: zenoh.Query) -> None:
+        with query:
+            asked.append(str(query.key_expr))
+            if len(asked) > 1:
+                held = encode(tf("odom", "base_link", 1.0, 2.0))
+                query.reply("tf_static", held, encoding="application/json")
+
+    queryable = bus.session.declare_queryable("tf_static", answer)
+    token = bus.announce("pub", TFMessage.ROS, "tf_static")
+    code, out, err = run("tf", "echo", "odom", "base_link", "--once", "--timeout", "10")
+    assert (code, err) == (0, "")
+    assert "- Translation: [1.000, 2.000, 0.000]" in out
+    token.undeclare()
+    queryable.undeclare()
 
 
 def test_a_robot_without_transforms_is_reported_with_those_that_have_some(

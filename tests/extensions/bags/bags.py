@@ -41,6 +41,12 @@ def a_bag(path: Path, count: int = 20) -> Path:
     return path
 
 
+def played(errors: str) -> list[str]:
+    """What `replay` wrote to standard error, but for its stalls on a busy machine."""
+    lines = errors.splitlines()
+    return [line for line in lines if not line.startswith("replay did not run for ")]
+
+
 def read(path: Path) -> list[Found]:
     """All messages of a file."""
     with Bag(path) as bag:

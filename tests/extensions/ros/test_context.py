@@ -1,7 +1,6 @@
 """A context begins once and ends once, and calls its shutdown callbacks."""
 
 import signal
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -250,7 +249,7 @@ def script(wire: Wire, tmp_path: Path) -> Script:
     def start(text: str) -> Process:
         path = tmp_path / "script.py"
         path.write_text(START + text)
-        return Process([sys.executable, "-u", "-m", "holozen", "run", *wire.flags, str(path)])
+        return wire.start("run", str(path))
 
     return start
 

@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 
 from holozen.testing import Process, Wire
+from holozen.testing.process import run as run_program
+from holozen.testing.wire import command
 
 from .conftest import Write
 
@@ -21,15 +23,16 @@ REPO = Path(__file__).parents[3]
 
 @pytest.fixture
 def run(home: Path, wire: Wire) -> Run:
-    """`run("controller.py", "--x")`: run it to its end, in the working folder."""
+    """`run("controller.py", "--x")`: run it to its end, in the working folder. `is_new`: in a new
+    Python, where variables are given or its end matters.
+    """
 
     def run(
-        *words: str, flags: tuple[str, ...] = (), **env: str
+        *words: str, flags: tuple[str, ...] = (), is_new: bool = False, **env: str
     ) -> subprocess.CompletedProcess[str]:
-        line = [sys.executable, "-m", "holozen", "run", *wire.flags, *flags, *words]
-        return subprocess.run(
-            line, capture_output=True, text=True, timeout=60, env=environment(**env)
-        )
+        line = command("run", *wire.flags, *flags, *words)
+        is_new |= bool(env)
+        return run_program(line, 60.0, is_new=is_new, env=environment(**env) if is_new else None)
 
     return run
 
@@ -52,7 +55,7 @@ def test_a_script_is_main_with_its_own_words_and_folder_first(run: Run, write: W
         "helper.word)"
     )
     path = write("scripts/a.py", f"import sys, helper\n{message}")
-    done = run("scripts/a.py", "x", "--connect", "-h", "--ros-args", "-r", "a:=b")
+    done = run("scripts/a.py", "x", "--connect", "-h", "--ros-args", "-r", "a:=b", is_new=True)
     words = [str(path), "x", "--connect", "-h", "--ros-args", "-r", "a:=b"]
     assert done.stdout == f"__main__ {words} {path} True helped\n"
     assert (done.returncode, done.stderr) == (0, "")
@@ -163,7 +166,7 @@ def test_what_a_script_wrote_to_a_file_that_it_left_open_is_there(
     run: Run, write: Write, home: Path
 ) -> None:
     write("a.py", "import rclpy\nfile = open('measured.csv', 'w')\nfile.write('1,2')")
-    assert run("a.py").returncode == 0
+    assert run("a.py", is_new=True).returncode == 0
     assert Path("measured.csv").read_text() == "1,2"
 
 
@@ -391,7 +394,7 @@ threading.Timer(0.05, print, ["a thread"], dict(end=" ")).start()
 atexit.register(lambda: log.write(", 9") and print("what was due", end=""))
 """,
     )
-    done = run("a.py")
+    done = run("a.py", is_new=True)
     assert (done.returncode, done.stdout, done.stderr) == (0, "a thread what was due", "")
     assert (home / "log.csv").read_text() == "1, 2, 9"
     assert gzip.decompress((home / "log.gz").read_bytes()) == b"3, 4"

@@ -7,6 +7,8 @@ import pytest
 
 from holozen.messages import JointState, Twist
 from holozen.testing import Wire, wait_for
+from holozen.testing.process import PATIENCE
+from holozen.view import foxglove_server
 from holozen.view.foxglove_server import TURN, Commands, Turns
 
 A, B = 1, 2
@@ -40,7 +42,10 @@ def test_any_client_stops_a_robot_whose_driver_then_has_to_let_go() -> None:
 @pytest.mark.parametrize(
     "command", [b'{"name": ["a"], "position": [1.0]}', b'{"name": ["a"], "effort": [1.0]}']
 )
-def test_whoever_drives_a_robot_also_has_its_joints(wire: Wire, command: bytes) -> None:
+def test_whoever_drives_a_robot_also_has_its_joints(
+    wire: Wire, monkeypatch: pytest.MonkeyPatch, command: bytes
+) -> None:
+    monkeypatch.setattr(foxglove_server, "TURN", PATIENCE)
     sim, view = wire.bus("sim"), wire.bus("view")
     sim.subscribe("cmd_vel", Twist)
     sim.subscribe("joint_command", JointState)
@@ -48,9 +53,10 @@ def test_whoever_drives_a_robot_also_has_its_joints(wire: Wire, command: bytes) 
     commands = Commands(view, view.endpoints)
     commands.open(A, channel("cmd_vel", Twist))
     commands.open(B, channel("joint_command", JointState))
-    commands.put(A, 7, b'{"linear": {"x": 0.3}}', time.monotonic())
+    prompt = time.monotonic() + PATIENCE  # at any time until then
+    commands.put(A, 7, b'{"linear": {"x": 0.3}}', prompt)
     with pytest.raises(ValueError, match=r"^/joint_command: somebody else drives"):
-        commands.put(B, 7, command, time.monotonic())
+        commands.put(B, 7, command, prompt)
     commands.halt()
 
 

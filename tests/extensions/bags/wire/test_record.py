@@ -8,6 +8,7 @@ import shlex
 import signal
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import cast
 
@@ -17,6 +18,7 @@ import zenoh
 from holozen.bags.reader import Bag
 from holozen.messages import Odometry, TFMessage, Twist, codec
 from holozen.testing import Process, Wire, wait_for
+from holozen.testing.process import PATIENCE
 from holozen.testing.wire import command
 from tests.integration.conftest import Verb
 from tests.integration.foreign_samples import PAYLOADS
@@ -47,10 +49,11 @@ def test_foreign_payloads_are_recorded_byte_for_byte_with_their_encodings(
     recorder = wire.start("record", "any/**", "-o", str(tmp_path / "a"))
     session = listening(wire, "any/thing")
     for i, (encoding, payload) in enumerate(PAYLOADS.items()):
-        session.put(f"any/{i}", payload, encoding=encoding)
+        session.put(f"any/{i}", payload, encoding=encoding, congestion_control=BLOCK)
     session.put("other", b"not asked for")
-    session.delete("any/0")  # it would be replayed as an empty message
-    session.put("any/last", b"")
+    # it would be replayed as an empty message
+    session.delete("any/0", congestion_control=BLOCK)
+    session.put("any/last", b"", congestion_control=BLOCK)
     wait_for(
         lambda: len(read(tmp_path / "a.mcap")) == len(PAYLOADS) + 1,
         what="the messages to be flushed",
@@ -64,19 +67,26 @@ def test_foreign_payloads_are_recorded_byte_for_byte_with_their_encodings(
 
 
 def test_a_live_robot_is_recorded_with_the_types_of_ros(
-    call: Verb, verb: Verb, town: Wire, robot: Robot, tmp_path: Path
+    call: Verb, town: Wire, robot: Robot, tmp_path: Path
 ) -> None:
-    done = verb(town, "record", "-a", "-o", str(tmp_path / "a"), "--max-duration", "1.5", "--json")
-    assert done.returncode == 0, done.stderr
-    *_, last = map(json.loads, done.stdout.splitlines())
+    recorder = town.start("record", "-a", "-o", str(tmp_path / "a"), "--json")
+    recorder.wait_for_line("recording ")
+
+    def counts() -> Counter[str]:
+        return Counter(message.channel.key for message in read(tmp_path / "a.mcap"))
+
+    wait_for(lambda: min(counts()[key] for key in ("odom", "tf")) > 10, what="odom and tf")
+    assert recorder.interrupt() == 0, recorder.err
+    *_, last = map(json.loads, recorder.out.splitlines())
     assert last["files"] == [str(tmp_path / "a.mcap")]
-    assert (last["dropped"], last["overran"], last["lost"], last["error"]) == (0, 0, 0, "")
+    assert (last["dropped"], last["overran"], last["error"]) == (0, 0, "")
     info = json.loads(info_of(call, tmp_path / "a.mcap", "--json"))
     types = {topic["key"]: topic["type"] for topic in info["topics"]}
     assert types["odom"] == "nav_msgs/msg/Odometry"
     assert types["tf"] == "tf2_msgs/msg/TFMessage"
     assert info["messages"] == last["messages"]
-    assert all(topic["missing"] == 0 for topic in info["topics"])
+    # what Zenoh dropped on its way here, on a busy machine
+    assert sum(topic["missing"] for topic in info["topics"]) == last["lost"]
 
 
 def test_a_killed_recorder_leaves_a_file_that_can_be_read(
@@ -137,11 +147,10 @@ def test_a_file_that_is_deleted_ends_the_recording_with_an_error(
 
 def test_keys_on_which_nothing_arrived_are_named(wire: Wire, tmp_path: Path) -> None:
     """After some time, and at the end, with the key that may be meant."""
-    recorder = wire.start("record", "a/*", "b/*", "cmdvel", "-o", str(tmp_path / "a"))
-    session = listening(wire, "a/b")
     _robot = wire.bus("sim").subscribe("cmd_vel", Twist)
-    session.put("a/b", b"x")
-    wait_for(lambda: read(tmp_path / "a.mcap"), what="the message to be flushed")
+    writer = wire.start("topic", "pub", "a/b", "std_msgs/msg/String", "{}", "-r", "50")
+    writer.wait_for_line("no subscribers")
+    recorder = wire.start("record", "a/*", "b/*", "cmdvel", "-o", str(tmp_path / "a"))
     recorder.wait_for_line("nothing has arrived on b/*, cmdvel (did you mean 'cmd_vel'?)")
     assert recorder.interrupt() == 0
     expected = "holozen record: nothing arrived on b/*, cmdvel (did you mean 'cmd_vel'?)"
@@ -199,9 +208,7 @@ with Wire() as wire:
     session = wire.bus("writer").session
     publisher = session.declare_publisher("a")
     wait_for(lambda: publisher.matching_status.matching)
-    for i in range(20_000):
-        if recorder.returncode is not None:
-            break
+    while recorder.returncode is None:
         publisher.put(os.urandom(10_000))
     code = recorder.wait(30)
     out, err = recorder.out, recorder.err
@@ -270,22 +277,14 @@ def test_regular_expressions_choose_keys_and_leave_some_out(
 
 
 def test_for_ros_the_robot_is_recorded_in_cdr_by_the_sims_own_clock(
-    verb: Verb, town: Wire, robot: Robot, tmp_path: Path
+    town: Wire, robot: Robot, tmp_path: Path
 ) -> None:
     path = tmp_path / "a.mcap"
-    words = (
-        "odom",
-        "tf",
-        "-o",
-        str(path),
-        "--max-duration",
-        "1",
-        "--wire",
-        "cdr",
-        "--use-sim-time",
-    )
-    done = verb(town, "record", *words)
-    assert done.returncode == 0, done.stderr
+    words = ("odom", "tf", "-o", str(path), "--wire", "cdr", "--use-sim-time")
+    recorder = town.start("record", *words)
+    recorder.wait_for_line("recording ")
+    wait_for(lambda: len(read(path)) > 50, what="messages")
+    assert recorder.interrupt() == 0, recorder.err
     stamps = []
     for message in read(path):
         assert message.channel.encoding == f"application/cdr;{message.channel.type}"
@@ -293,7 +292,8 @@ def test_for_ros_the_robot_is_recorded_in_cdr_by_the_sims_own_clock(
             odom = codec.decode(message.payload, message.channel.encoding, (Odometry,))
             stamps.append((odom.header.stamp.seconds(), message.at / 1e9))
     assert len(stamps) > 10
-    assert all(stamp == pytest.approx(at, abs=0.5) for stamp, at in stamps)
+    # s; what waits in a held-up recorder is written late
+    assert all(stamp == pytest.approx(at, abs=PATIENCE) for stamp, at in stamps)
 
 
 def test_without_a_clock_there_is_no_time_of_the_sim(wire: Wire, tmp_path: Path) -> None:

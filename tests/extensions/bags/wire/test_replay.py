@@ -12,6 +12,7 @@ import pytest
 
 from holozen.bags.formats import format_of
 from holozen.bags.writer import BagWriter
+from holozen.command.feedback import LATE
 from holozen.messages import (
     Header,
     JointState,
@@ -28,6 +29,7 @@ from holozen.messages import (
 from holozen.testing import Wire, wait_for
 from holozen.transport.graph import on_key
 from holozen.transport.samples import RawSubscriber, Sample
+from tests.extensions.bags.bags import played
 from tests.integration.conftest import Verb
 from tests.integration.foreign_samples import PAYLOADS
 from tests.integration.processes import read
@@ -66,6 +68,12 @@ def heard(tap: RawSubscriber, *, count: int = 0, last: list[bytes] = []) -> list
     return found
 
 
+def assert_obeyed(code: int, errors: str) -> None:
+    """It ended well; on a busy machine its last command may have been late."""
+    lines = played(errors)
+    assert code == 0 or lines[-1].startswith(tuple(f"not obeyed: {why}" for why in LATE)), errors
+
+
 def commands(count: int, every: float = 50.0) -> list[tuple[str, bytes, str, float]]:
     """Forward, again and again, for `count` times `every` ms."""
     return [("cmd_vel", FORWARD, "application/json", i * every) for i in range(count)]
@@ -80,11 +88,7 @@ def test_payloads_and_encodings_are_those_of_the_bag(
     ]
     tap = wire.bus().subscribe_raw("any/**")
     done = verb(wire, "replay", bag(tmp_path / "a.mcap", *rows))
-    # a busy machine
-    stalls = [
-        line for line in done.stderr.splitlines() if line.startswith("replay did not run for ")
-    ]
-    assert (done.returncode, done.stderr.splitlines()) == (0, stalls)
+    assert (done.returncode, played(done.stderr)) == (0, [])
     assert done.stdout.startswith(f"played {len(rows)} messages in ")
     assert [(s.key, s.payload, s.encoding) for s in heard(tap, count=len(rows))] == [
         (key, p, e) for key, p, e, _ in rows
@@ -124,7 +128,7 @@ def test_beside_a_live_robot_nothing_is_played_that_could_disturb_it(
     tap = robot.bus.subscribe_raw("note")
     done = verb(town, "replay", path)
     assert done.returncode == 0
-    assert done.stderr.splitlines() == [
+    assert played(done.stderr) == [
         "cmd_vel is left out: it moves robots; --commands plays it too",
         "odom is left out: sim publishes it now; --remap odom:=NEW plays it elsewhere",
     ]
@@ -153,7 +157,7 @@ def test_commands_drive_the_robot_and_a_stop_ends_them(
     path = bag(tmp_path / "a.mcap", *commands(8), types=(Twist,))
     tap = robot.bus.subscribe_raw("cmd_vel")
     done = verb(town, "replay", path, "--commands")
-    assert done.returncode == 0, done.stderr
+    assert_obeyed(done.returncode, done.stderr)
     sent = heard(tap, count=8, last=STOPS)
     assert [s.payload for s in sent[:8]] == [FORWARD] * 8
     assert {s.priority for s in sent} == {"DATA"}
@@ -169,9 +173,10 @@ def test_commands_that_a_robot_does_not_obey_are_reported(
     done = verb(town, "replay", path, "--commands")
     assert verb(town, "release").returncode == 0
     assert done.returncode == 1
-    assert re.fullmatch(
-        r"not obeyed: the robot is stopped by stop@\w+; `holozen release` lets it drive again\n",
+    assert re.search(
+        r"^not obeyed: the robot is stopped by stop@\w+; `holozen release` lets it drive again$",
         done.stderr,
+        re.M,
     )
 
 
@@ -194,27 +199,36 @@ def test_a_robot_that_comes_while_it_plays_is_not_moved(
         notes.recv()
     assert max(abs(speed) for odom in robot.odom.messages() for speed in speeds(odom)) < 0.01
     assert player.interrupt() == 0
-    assert (
-        player.err
-        == "Ann/drive is left out from here on: it moves robots; --commands plays it too\n"
-    )
+    assert played(player.err) == [
+        "Ann/drive is left out from here on: it moves robots; --commands plays it too"
+    ]
 
 
-@pytest.mark.parametrize("form", ["json", "cdr"])
-@pytest.mark.parametrize(
-    "command", [Twist.planar(0.1), TwistStamped(twist=Twist.planar(0.1)), Wrench(Vector3(1.0))]
-)
 def test_what_robots_would_read_as_a_command_is_one_whatever_its_key(
-    verb: Verb, wire: Wire, tmp_path: Path, form: str, command: Message
+    verb: Verb, wire: Wire, tmp_path: Path
 ) -> None:
-    kind = type(command)
-    row = ("any", codec.encode(command, form), codec.encoding(form, kind), 0.0)
-    tap = wire.bus().subscribe_raw("any")
-    path = bag(tmp_path / "a.mcap", row)
-    assert verb(wire, "replay", path).returncode == 1
+    commands: dict[str, tuple[Message, str]] = {
+        f"{type(command).__name__}_{form}": (command, form)
+        for command in (
+            Twist.planar(0.1),
+            TwistStamped(twist=Twist.planar(0.1)),
+            Wrench(Vector3(1.0)),
+        )
+        for form in ("json", "cdr")
+    }
+    rows = [
+        (key, codec.encode(command, form), codec.encoding(form, type(command)), 0.0)
+        for key, (command, form) in commands.items()
+    ]
+    tap = wire.bus().subscribe_raw("*")
+    path = bag(tmp_path / "a.mcap", *rows)
+    assert verb(wire, "replay", path).returncode == 1, "nothing is played"
     assert verb(wire, "replay", path, "--commands").returncode == 0
-    sent = [codec.decode(s.payload, s.encoding, (kind,)) for s in heard(tap, count=6)]
-    assert sent == [command, *[kind()] * 5]
+    sent = heard(tap, count=6 * len(commands))
+    for key, (command, _) in commands.items():
+        kind = type(command)
+        found = [codec.decode(s.payload, s.encoding, (kind,)) for s in sent if s.key == key]
+        assert found == [command, *[kind()] * 5], key
 
 
 def test_what_moves_nothing_is_played_on_any_key(verb: Verb, wire: Wire, tmp_path: Path) -> None:
@@ -231,7 +245,7 @@ def test_what_moves_nothing_is_played_on_any_key(verb: Verb, wire: Wire, tmp_pat
         "replay",
         bag(tmp_path / "a.mcap", *[("any", p, "text/plain", i) for i, p in enumerate(payloads)]),
     )
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (done.returncode, played(done.stderr)) == (0, [])
     assert [s.payload for s in heard(tap, count=len(payloads))] == payloads
 
 
@@ -245,10 +259,10 @@ def test_stamped_commands_drive_with_a_stamp_of_now(
     rows = [("cmd_vel", payload, encoding, i * 50.0) for i in range(20)]
     path = bag(tmp_path / "a.mcap", *rows, types=(Twist, TwistStamped))
     tap, begun = robot.bus.subscribe_raw("cmd_vel"), time.time()
-    player = town.start("replay", path, "--commands")
+    player = town.start("replay", path, "--commands", "--loop")
     wait_for(lambda: moves(robot.newest(), 0.2, 0, 0, tolerance=0.02), what="the robot to move")
-    assert player.wait() == 0, player.err
-    first = heard(tap, count=20)[0]
+    assert_obeyed(player.interrupt(), player.err)
+    first = heard(tap, count=1)[0]
     command = codec.decode(first.payload, first.encoding, (TwistStamped,))
     assert (first.encoding, command.header.frame_id, command.twist) == (
         encoding,
@@ -285,10 +299,9 @@ def test_at_the_end_it_names_the_goals_that_still_drive(
         "--commands",
     )
     assert done.returncode == 0, done.stderr
-    assert (
-        done.stderr
-        == "goal_pose: the robot may drive on to the last goal, since its controller drives it\n"
-    )
+    assert played(done.stderr) == [
+        "goal_pose: the robot may drive on to the last goal, since its controller drives it"
+    ]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
@@ -298,7 +311,7 @@ def test_a_signal_stops_the_robot(town: Wire, robot: Robot, tmp_path: Path, numb
     player = town.start("replay", path, "--commands", "--loop")
     wait_for(lambda: moves(robot.newest(), 0.2, 0, 0, tolerance=0.02), what="the robot to move")
     player.signal(number)
-    assert player.wait() == 0, player.err
+    assert_obeyed(player.wait(), player.err)
     heard(tap, last=STOPS)
     robot.stands()
 
@@ -347,29 +360,40 @@ def test_a_pause_stops_the_robot(wire: Wire, tmp_path: Path) -> None:
     terminal = wire.terminal(
         "replay", bag(tmp_path / "a.mcap", *commands(600), types=(Twist,)), "--commands"
     )
-    terminal.wait_for_text("space pauses")
+    heard(tap, count=1)
     terminal.type(" ")
     terminal.wait_for_text("paused: space resumes")
-    heard(tap, last=[FORWARD, *STOPS])
+    heard(tap, last=STOPS)
     terminal.type("\x03")
     assert terminal.process.wait() == 0
 
 
-@pytest.mark.parametrize("kind", ["velocity", "effort", "position"])
-def test_a_pause_stops_joints_but_those_that_go_to_a_position(
-    wire: Wire, tmp_path: Path, kind: str
-) -> None:
-    turn = json.dumps({"name": ["a", "b"], kind: [1.0, 2.0]}).encode()
-    rows = [("joint_command", turn, "application/json", i * 50.0) for i in range(600)]
-    tap = wire.bus().subscribe_raw("joint_command")
+def test_a_pause_stops_joints_but_those_that_go_to_a_position(wire: Wire, tmp_path: Path) -> None:
+    turns = {
+        f"{kind}/joint_command": json.dumps({"name": ["a", "b"], kind: [1.0, 2.0]}).encode()
+        for kind in ("position", "velocity", "effort")
+    }
+    rows = [
+        (key, turn, "application/json", i * 50.0) for i in range(600) for key, turn in turns.items()
+    ]
+    tap = wire.bus().subscribe_raw("*/joint_command")
     terminal = wire.terminal(
         "replay", bag(tmp_path / "a.mcap", *rows, types=(JointState,)), "--commands"
     )
-    terminal.wait_for_text("space pauses")
+    found = {key: list[bytes]() for key in turns}
+
+    def came() -> dict[str, list[bytes]]:
+        for sample in iter(tap.try_recv, None):
+            found[sample.key].append(sample.payload)
+        return found
+
+    wait_for(lambda: all(came().values()), what="all joints to be moved")
     terminal.type(" ")
     terminal.wait_for_text("paused: space resumes")
     stop = codec.encode(JointState(name=["a", "b"], velocity=[0.0, 0.0]))
-    heard(tap, last=[turn] if kind == "position" else [turn, *[stop] * 5])
+    position, *others = turns
+    wait_for(lambda: all(came()[key][-5:] == [stop] * 5 for key in others), what="their stops")
+    assert set(came()[position]) == {turns[position]}
     terminal.type("\x03")
     assert terminal.process.wait() == 0
 

@@ -81,32 +81,33 @@ def test_with_a_robot_that_drives_all_is_well_and_a_stop_is_reported_as_no_error
     controller = wire.start("controller")
     odom = wire.bus().latest("odom", Odometry)
     wait_for(lambda: (now := odom.read()[0]) and not now.twist.twist.is_slow(0.1))
-    code, rows = doctor(verb, wire)
-    assert (code, [row for row in rows if row["level"] == "error"]) == (0, [])
-    texts = " ".join(row["text"] for row in rows)
-    assert "3 of this version: controller (pid" in texts
-    assert "fresh on odom" in texts
-    assert "and speaks Zenoh" in texts
+
+    def is_well() -> bool:
+        code, rows = doctor(verb, wire)
+        texts = " ".join(row["text"] for row in rows)
+        parts = ("3 of this version: controller (pid", "fresh on odom", "and speaks Zenoh")
+        seen.append(texts)
+        return code == 0 and all(part in texts for part in parts)
+
+    seen = list[str]()
+    wait_for(is_well, what=lambda: f"all to be well: {seen[-1]}")  # a busy machine is late
     assert controller.returncode is None
     assert "yields" not in controller.err
     wait_for(
         lambda: (now := odom.read()[0]) and not now.twist.twist.is_slow(0.1), what="it to drive on"
     )
     assert verb(wire, "stop").returncode == 0
-    code, rows = doctor(verb, wire)
-    assert (code, bad(rows, "cmd_vel")[0].startswith("warning: hb_bot is stopped by stop@")) == (
-        0,
-        True,
-    )
+    _, rows = doctor_when_bad(verb, wire, "cmd_vel")
+    assert bad(rows, "cmd_vel")[0].startswith("warning: hb_bot is stopped by stop@")
 
 
 def test_a_paused_sim_is_a_warning_until_it_plays(verb: Verb, wire: Wire) -> None:
     wire.start("sim").wait_for_line("listens on")
     assert verb(wire, "sim", "pause").returncode == 0
-    code, rows = doctor(verb, wire)
-    assert (code, bad(rows, "sim")) == (0, ["warning: the sim is paused: its robots stand still"])
+    _, rows = doctor_when_bad(verb, wire, "sim")
+    assert bad(rows, "sim") == ["warning: the sim is paused: its robots stand still"]
     assert verb(wire, "sim", "play").returncode == 0
-    assert bad(doctor(verb, wire)[1], "sim") == []
+    wait_for(lambda: not bad(doctor(verb, wire)[1], "sim"), what="it to play")
 
 
 @pytest.mark.needs("ip", "unshare")
@@ -208,17 +209,22 @@ def test_two_sources_that_fight_for_a_robot_and_two_sims_on_one_key_are_reported
     sim = wire.start("sim")
     sim.wait_for_line("listens on")
     with commanding(wire.bus("left"), wire.bus("right")):
-        (text,) = wait_for(lambda: bad(doctor(verb, wire)[1], "cmd_vel"), within=30)
+        (text,) = wait_for(lambda: bad(doctor(verb, wire)[1], "cmd_vel"))
     assert text.startswith("error: 2 sources command hb_bot at once: left@")
     assert "(script, " in text and "not obeyed" in text and "right@" in text
     clock = wire.bus("other", lasting=True).publisher("clock", Clock)  # our own sim would refuse
-    code, rows = doctor_when_bad(verb, wire, "duplicates")
-    (text,) = bad(rows, "duplicates")
-    assert code == 1 and text.startswith("error: ")
-    assert all(
-        f"{name} (pid {pid} on {os.uname().nodename})" in text
+    nodes = [
+        f"{name} (pid {pid} on {os.uname().nodename})"
         for name, pid in [("sim", sim.pid), ("other", os.getpid())]
-    )
+    ]
+
+    def are_named() -> bool:  # one that answers late is named without its process
+        code, rows = doctor_when_bad(verb, wire, "duplicates")
+        (text,) = bad(rows, "duplicates")
+        assert code == 1 and text.startswith("error: ")
+        return all(node in text for node in nodes)
+
+    wait_for(are_named, what=lambda: f"{nodes}")
     clock.close()
 
 
@@ -343,7 +349,7 @@ def test_variables_put_every_process_on_a_network_and_the_doctor_shows_them(
         )
 
     with Process(command("up"), env=env) as up:
-        up.wait_for_line("goals")
+        up.wait_for_line("goals", within=60)
         wait_for(lambda: "controller" in wire.run("node", "list").stdout, what="all that up starts")
         assert run("topic", "echo", "odom", "--once").returncode == 0
         shown = run("doctor", "--json", "--mode", "peer").stdout

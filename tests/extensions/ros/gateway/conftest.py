@@ -3,6 +3,7 @@ and the bridge.
 """
 
 import contextlib
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from holozen.testing import Wire, wait_for
 from tests.built import built, needs
 
 BRIDGE = built("bridge")
+ASK_AGAIN = 0.5  # s for the answer to a late subscriber, until another one is made
 
 HASHES = {
     "std_msgs/msg/String": "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",  # noqa: E501
@@ -72,7 +74,7 @@ class Theirs:
             "ROS2Subscriber", topic, kind, callback, msg_definition=definition(kind), **more
         )
 
-    def latched(self, topic: str, kind: str) -> list[Any]:
+    def latched(self, topic: str, kind: str) -> Any:
         """The last message of a topic, as a late subscriber has it. That asks once, as it is made:
         before its link to the publisher is up it would find none, so others are made until one has.
         """
@@ -81,12 +83,17 @@ class Theirs:
         found: list[Any] = []
         qos = QosProfile(durability=QosDurability.TRANSIENT_LOCAL, history_depth=1)
 
+        due = 0.0
+
         def has_come() -> bool:
-            self.subscriber(topic, kind, found.append, qos=qos)
+            nonlocal due
+            if not found and time.monotonic() > due:
+                self.subscriber(topic, kind, found.append, qos=qos)
+                due = time.monotonic() + ASK_AGAIN
             return bool(found)
 
         wait_for(has_come, what=f"the last message of {topic}")
-        return found
+        return found[0]
 
     def trigger(self, name: str) -> Any:
         """A client of a service with the type Trigger: `call()`."""

@@ -198,18 +198,21 @@ class Node:
 
 
 class Client:
-    """Calls a service: `call(field=value)` sends a request, `reply()` reads its reply, or None."""
+    """Calls a service: `call(field=value)` sends a request, `reply()` reads its reply, or None.
+    `sent` is the number of requests.
+    """
 
     def __init__(self, requests: Any, replies: Any) -> None:
-        self._requests, self._replies, self._number = requests, replies, 0
+        self._requests, self._replies, self.sent = requests, replies, 0
 
     def call(self, **fields: Any) -> None:
         """Send a request."""
-        self._number += 1
+        self.sent += 1
         kind = self._requests.topic.data_type
         values = fields or {"structure_needs_at_least_one_member": 0}
-        self._requests.write(kind(client=0x1234, number=self._number, **values))
+        self._requests.write(kind(client=0x1234, number=self.sent, **values))
 
-    def reply(self) -> Any:
-        """The reply to the last request, or None."""
-        return next((one for one in self._replies.take(100) if one.number == self._number), None)
+    def reply(self, first: int = 0) -> Any:
+        """The reply to the last request, or to any from the `first` one on; None before."""
+        since = first or self.sent
+        return next((one for one in self._replies.take(100) if one.number >= since), None)

@@ -82,6 +82,14 @@ class Kept:
         return found[3:]
 
 
+def gone(pid: int) -> bool:
+    """Whether a process has ended; its parent may not have read how."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except OSError:
+        return True
+
+
 @pytest.fixture
 def follow(my_bot: Path) -> Iterator[Follow]:
     """`follow([actions], name="value")`: what they do in a launch file of my_bot, with values of

@@ -9,10 +9,13 @@ from typing import Any
 import pytest
 
 from holozen.ros.launch import actions as a
+from holozen.ros.launch import launch_service
 from holozen.ros.launch.event_handlers import OnProcessExit, OnProcessStart, OnShutdown
 from holozen.ros.launch.launch_context import LaunchError, Program
 from holozen.ros.launch.launch_service import Supervisor
 from holozen.testing import wait_for
+
+from .conftest import gone
 
 Play = Callable[..., tuple[bool, list[str], list[str]]]
 
@@ -40,13 +43,6 @@ def play(capfd: pytest.CaptureFixture[str], my_bot: Path) -> Play:
         return good, out.splitlines(), err.splitlines()
 
     return play
-
-
-def gone(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
-    except OSError:
-        return True
 
 
 def test_lines_of_both_outputs_come_after_the_name(play: Play) -> None:
@@ -149,13 +145,12 @@ def test_a_process_that_is_left_out_has_begun(play: Play) -> None:
 
 
 def test_a_timer_waits_and_may_be_cancelled(play: Play) -> None:
-    never = a.TimerAction(period=0.05, actions=[log("never")])
+    never = a.TimerAction(period=0.02, actions=[log("never")])
     cancel = a.OpaqueFunction(function=lambda _context: never.cancel())
-    later = a.TimerAction(period=0.1, actions=[log("third")])
-    _, _, err = play(
-        later, never, a.TimerAction(period=0.02, actions=[log("second")]), cancel, log("first")
-    )
-    assert err == ["first", "second", "third"]
+    later = a.TimerAction(period=600.0, actions=[log("third")])
+    second = a.TimerAction(period=0.05, actions=[log("second"), a.Shutdown(reason="it is late")])
+    _, _, err = play(later, never, second, cancel, log("first"))
+    assert err == ["first", "second", "launch: ending: it is late"]
 
 
 def test_a_timer_in_a_group_has_the_values_of_the_group(play: Play) -> None:
@@ -193,20 +188,40 @@ def test_a_program_that_is_not_there_is_reported_with_its_place(play: Play) -> N
         play(sh("sleep 60"), a.ExecuteProcess(cmd=["no_such_program"]))
 
 
+SOON, LATE = 0.1, 60.0  # s until the next signal: the process ignores this one, or obeys it
+
+
 @pytest.mark.parametrize(
-    ("script", "last"),
+    ("script", "graces", "last"),
     [
-        ("trap 'echo INT; exit' INT; echo up; while :; do sleep 0.02; done", "[p-1] INT"),
+        (
+            "trap 'echo INT; exit' INT; echo up; while :; do sleep 0.02; done",
+            (LATE, SOON),
+            "[p-1] INT",
+        ),
         (
             "trap '' INT; trap 'echo TERM; exit' TERM; echo up; while :; do sleep 0.02; done",
+            (SOON, LATE),
             "[p-1] TERM",
         ),
-        ("trap '' INT TERM; sh -c 'sleep 60' & echo up; while :; do sleep 0.02; done", ""),
+        (
+            "trap '' INT TERM; sh -c 'sleep 60' & echo up; while :; do sleep 0.02; done",
+            (SOON, SOON),
+            "",
+        ),
     ],
 )
 def test_a_stop_ends_all_kindly_first(
-    capfd: pytest.CaptureFixture[str], my_bot: Path, tmp_path: Path, script: str, last: str
+    capfd: pytest.CaptureFixture[str],
+    my_bot: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    script: str,
+    graces: tuple[float, float],
+    last: str,
 ) -> None:
+    numbers = [number for number, _ in launch_service.GRACE]
+    monkeypatch.setattr(launch_service, "GRACE", tuple(zip(numbers, graces, strict=True)))
     stop, pid = threading.Event(), tmp_path / "pid"
     stage = Supervisor([], stop)
 

@@ -9,6 +9,7 @@ import ssl
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,6 +24,7 @@ from holozen import cli, entities
 from holozen.bags.formats import format_of
 from holozen.bags.writer import BagWriter
 from holozen.bus import Bus, Publisher
+from holozen.command.feedback import LATE
 from holozen.doctor import diagnosis as doctor
 from holozen.messages import (
     CommandStatus,
@@ -46,12 +48,17 @@ from holozen.testing import Process, wait_for
 from holozen.testing.wire import command, free_port
 from holozen.transport.beat import BEAT, GOAL_BEAT, beat_key
 from holozen.transport.connection import Connection, from_environment
-from holozen.transport.errors import BusError, NoReply
+from holozen.transport.errors import BusError, NoReply, ServiceError
 from holozen.transport.samples import RawSubscriber
 from holozen.wire import TOPICS
 from tests.fleet import Fleet
 
 FORWARD = b'{"linear": {"x": 0.3}}'
+
+
+def unproven(status: CommandStatus) -> dict[str, int]:
+    """The refused commands, without those that a busy machine held up."""
+    return {kind: count for kind, count in status.refused.items() if kind not in LATE}
 
 
 class Robot:
@@ -103,8 +110,13 @@ class Robot:
             self.commands.put(Twist())
             return abs(self.speed) < 0.01
 
+        def handed_over() -> bool:  # not by a call that a stop of before may have overtaken
+            with contextlib.suppress(ServiceError):
+                return bool(self.bus.call("resume", TriggerRequest(), TriggerReply))
+            return False
+
         wait_for(stopped)
-        self.bus.call("resume", TriggerRequest(), TriggerReply)
+        wait_for(handed_over)
 
 
 @pytest.fixture(scope="module")
@@ -346,14 +358,19 @@ def test_a_replayed_command_of_a_driver_that_is_gone_moves_nothing(
     robot.stands()
     with fleet.bus("Eve") as eve:
         before = robot.status()
-        eve.session.put(
-            "cmd_vel",
-            sample.payload,
-            encoding=sample.encoding,
-            attachment=sample.attachment,
-            priority=zenoh.Priority.INTERACTIVE_HIGH,
-        )
-        status = robot.refused("gone", before)
+
+        def refused() -> bool:  # it is known to be gone once its tokens are
+            eve.session.put(
+                "cmd_vel",
+                sample.payload,
+                encoding=sample.encoding,
+                attachment=sample.attachment,
+                priority=zenoh.Priority.INTERACTIVE_HIGH,
+            )
+            return robot.status().refused.get("gone", 0) > before.refused.get("gone", 0)
+
+        wait_for(refused, what=lambda: str(robot.status()))
+        status = robot.status()
     assert status.accepted == before.accepted
     assert abs(robot.speed) < 0.01
 
@@ -397,13 +414,13 @@ def test_a_bag_drives_as_its_player_may_and_what_the_router_drops_is_reported(
             )
     writer.close()
     before, play = robot.status(), ("replay", str(tmp_path / "a.mcap"), "--connect", fleet.endpoint)
-    player = fleet.start(*play, "--commands", folder="operator")
+    player = fleet.start(*play, "--commands", "--loop", folder="operator")
     wait_for(lambda: robot.speed > 0.2, what=lambda: str(robot.status()))
-    assert player.wait(60) == 1, "a part of it was not heard"
+    assert player.interrupt() == 1, "a part of it was not heard"
     assert "old/odom: the router drops what operator publishes there" in player.err
-    assert "played 40 messages" in player.out
+    assert player.out.startswith("played ")
     wait_for(lambda: abs(robot.speed) < 0.01)
-    assert robot.status().refused == before.refused
+    assert unproven(robot.status()) == unproven(before)
     for words in (
         (*play, "--topics", "old/odom"),
         ("topic", "pub", "-1", "old/odom", "{}", "--connect", fleet.endpoint),
@@ -463,11 +480,17 @@ def test_a_service_cannot_be_taken_over(fleet: Fleet, robot: Robot) -> None:
 def test_without_a_valid_certificate_no_node_gets_in_and_no_router_goes_on(
     fleet: Fleet, tmp_path: Path
 ) -> None:
-    authority.initialize(tmp_path / "brief", [], 8 / 86_400)
+    authority.initialize(tmp_path / "brief", [], 1)
+    authority.renew(tmp_path / "brief", ["sim", "operator", "autopilot", "script"], 0)
     listen = ("--listen", f"tls/127.0.0.1:{free_port()}")
     router = fleet.run(*command("router", *listen, "--secure", str(tmp_path / "brief")))
-    router.wait_for_line("router: listens at")
-    authority.renew(tmp_path / "brief", ["router", "viewer"], 1)
+
+    def has_begun(times: int) -> bool:
+        return router.err.count("router: listens at") == times
+
+    wait_for(partial(has_begun, 1))
+    authority.renew(tmp_path / "brief", ["router"], 1)
+    wait_for(partial(has_begun, 2))
     for kind, tls in (("tls", {"root_ca_certificate": str(fleet.root / "ca.pem")}), ("tcp", {})):
         config = zenoh.Config()
         endpoint = fleet.endpoint.replace("tls/", f"{kind}/")
@@ -494,8 +517,8 @@ def test_without_a_valid_certificate_no_node_gets_in_and_no_router_goes_on(
 
     wait_for(lambda: is_out("operator"))
     assert not is_out("viewer")
-    authority.renew(tmp_path / "brief", ["router"], 3 / 86_400)
-    assert router.wait(30) == 2, router.err
+    authority.renew(tmp_path / "brief", ["router"], 6 / 86_400)
+    assert router.wait() == 2, router.err
     *starts, last = router.err.splitlines()
     assert starts[1::2] == 3 * [f"router: listens at {listen[1]}"], router.err
     assert all(
