@@ -20,30 +20,36 @@ ENDS = """
 import threading, time
 from holozen.transport import session
 
+waited = threading.Event()
+
 def leave():
+    waited.wait()
     time.sleep({seconds})
     print("left", flush=True)
 
+session.LAST = {last}
 thread = threading.Thread(target=leave, daemon=True)
 thread.start()
 session.wait_for_threads((thread, None, threading.current_thread()), 0.01)
 print("waited", flush=True)
+waited.set()
 """
 
 
-def reported(seconds: float) -> list[str]:
-    words = [sys.executable, "-c", ENDS.format(seconds=seconds)]
+def reported(seconds: float, last: float) -> list[str]:
+    """What it prints whose thread takes so many seconds, and is waited for during the `last`."""
+    words = [sys.executable, "-c", ENDS.format(seconds=seconds, last=last)]
     return subprocess.run(
         words, capture_output=True, text=True, check=True, timeout=60
     ).stdout.split()
 
 
 def test_a_late_thread_may_leave_before_the_process_ends() -> None:
-    assert reported(0.2) == ["waited", "left"]
+    assert reported(0.1, 30.0) == ["waited", "left"]
 
 
 def test_a_hanging_thread_does_not_keep_the_process() -> None:
-    assert reported(3600) == ["waited"]
+    assert reported(3600, 0.1) == ["waited"]
 
 
 UNCLOSED = """
