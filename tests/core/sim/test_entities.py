@@ -501,7 +501,7 @@ def test_what_is_deleted_leaves_no_key_and_no_token_and_its_name_is_free(town: T
         wait_for(
             lambda: not any("Fred" in key for key in town.tokens()), what="the robot's tokens to go"
         )
-        before = before or town.tokens()
+        before = before or wait_for(lambda: (seen := town.tokens()) == town.tokens() and seen)
         wait_for(lambda before=before: town.tokens() == before, what="the same tokens")  # type: ignore[misc]
     assert list(town.entities) == [] and town.entities.robots == []
     assert (

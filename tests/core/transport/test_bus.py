@@ -541,7 +541,8 @@ def test_an_early_bus_that_is_interrupted_as_it_starts_leaves_no_thread_that_ope
         raise KeyboardInterrupt
 
     monkeypatch.setattr(session_module, "background", interrupted)
-    nowhere = Connection("client", connect=(wire.endpoint,))
+    quickly = ("connect/timeout_ms", "500")  # Zenoh tries for so long
+    nowhere = Connection("client", connect=(wire.endpoint,), cfg=(quickly,))
     before = threading.active_count()
     with pytest.raises(KeyboardInterrupt):
         Opening(nowhere, patience=60, early=True)
