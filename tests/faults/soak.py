@@ -195,14 +195,14 @@ class Soak:
         """Stop and release the robot. Afterwards only a driver that has let go may drive, so these
         end.
         """
-        self._bus.call("stop", TriggerRequest(), TriggerReply)
+        self._bus.call("stop", TriggerRequest(), TriggerReply, 20.0)
         since = time.monotonic()
         time.sleep(self.random.uniform(0.1, 1.0))
         self.stopped.append((since, time.monotonic()))
         self.kill()
-        self._bus.call("release", TriggerRequest(), TriggerReply)
+        self._bus.call("release", TriggerRequest(), TriggerReply, 20.0)
         with contextlib.suppress(ServiceError):  # someone drives
-            self._bus.call("resume", TriggerRequest(), TriggerReply)
+            self._bus.call("resume", TriggerRequest(), TriggerReply, 20.0)
 
     def spawn(self) -> None:
         unused = sorted({*NAMES} - {*self.names})
