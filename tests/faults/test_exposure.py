@@ -28,19 +28,14 @@ def found_by_the_doctor(host: Host) -> list[dict[str, str]]:
     return [row for row in rows if row["check"] == "network"]
 
 
-def test_a_sim_that_listens_beyond_loopback_warns_and_the_doctor_finds_it(
-    lab: Lab, host: Host
-) -> None:
-    lab.cable(host, lab.host("desk"))
-    for listen in ("udp/10.99.1.1:7447", "tcp/[::]:7447"):
-        sim = host.start(*command("sim", "--listen", listen))
-        assert sim.wait_for_line("open to the network") == f"sim: listens at {listen}, {RISK}"
-        sim.wait_for_line("listens on cmd_vel")
-        if listen.startswith("tcp"):
-            (row,) = found_by_the_doctor(host)
-            assert row["level"] == "warning"
-            assert f"listens at {listen}, {RISK}" in row["text"]
-        assert sim.terminate() == 0
+def test_a_sim_that_listens_beyond_loopback_warns_and_the_doctor_finds_it(host: Host) -> None:
+    sim = host.start(*command("sim", "--listen", "tcp/[::]:7447"))
+    warning = f"listens at tcp/[::]:7447, {RISK}"
+    assert sim.wait_for_line("open to the network") == f"sim: {warning}"
+    sim.wait_for_line("listens on cmd_vel")
+    (row,) = found_by_the_doctor(host)
+    assert row["level"] == "warning"
+    assert warning in row["text"]
 
 
 @pytest.mark.parametrize("flags", [(), ("--listen", "tcp/localhost:7447")], ids=" ".join)
