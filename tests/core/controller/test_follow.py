@@ -431,7 +431,7 @@ def test_a_goal_of_goal_pose_comes_before_the_list_and_the_robot_stays_until_a_r
 
 RESETS: dict[str, Callable[[Robot], None]] = {
     "its clock goes back": lambda robot: setattr(robot, "time", 0.0),
-    "it is elsewhere": lambda robot: setattr(robot, "pose", (20.0, 20.0, 0.0)),
+    "it is elsewhere": lambda robot: setattr(robot, "pose", (5.0, 5.0, 0.0)),
     "an epoch begins": lambda robot: setattr(robot, "epoch", robot.epoch + 1),
 }
 
