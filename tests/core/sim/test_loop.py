@@ -479,7 +479,7 @@ def test_a_stall_is_an_overrun_in_the_status(
         new = [received.message for received in iter(status.try_recv, None)]
         return new[-1] if new and new[-1] and new[-1].overruns else None
 
-    monkeypatch.setattr(loop_module.time, "monotonic", look)
+    monkeypatch.setattr(loop_module, "time", SimpleNamespace(monotonic=look, time=time.time))
     with sim.running():
         wait_for(lambda: ground.steps)
         before = ground.steps

@@ -221,8 +221,13 @@ def test_halt_stops_a_robot_and_returns_when_it_rests(
     wait_for(robot.heard)
     session.halt()  # no odom reports rest: given up after a second
     assert not session.mapper.engaged
-    heard = robot.heard()
-    wait_for(lambda: heard.extend(robot.heard()) or len(heard) > 10)
+    heard = list[Twist | TwistStamped | None]()
+
+    def heard_many() -> bool:
+        heard.extend(robot.heard())
+        return len(heard) > 10
+
+    wait_for(heard_many)
     assert set(map(str, heard)) == {str(Twist())}
 
 
