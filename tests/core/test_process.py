@@ -51,7 +51,7 @@ ending.leave(3)
 
 def ended(code: str, *words: str) -> tuple[int, str, str]:
     done = subprocess.run(
-        [sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=30
+        [sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=60
     )
     return done.returncode, done.stdout, done.stderr
 
@@ -84,9 +84,12 @@ def test_an_uncaught_exception_is_exit_code_1() -> None:
 
 def test_an_interrupt_ends_the_wait_for_threads() -> None:
     code = (
-        "import os, threading, zenoh\nfrom holozen.process import Ending\n"
+        "import os, signal, threading, time, zenoh\nfrom holozen.process import Ending\n"
+        "def interrupt():\n"
+        "    while signal.getsignal(2) is signal.default_int_handler: time.sleep(0.001)\n"
+        "    os.kill(os.getpid(), 2)\n"
         "threading.Thread(target=threading.Event().wait).start()\n"
-        "threading.Timer(0.05, os.kill, [os.getpid(), 2]).start()\n"
+        "threading.Thread(target=interrupt).start()\n"
         "Ending().leave(0)"
     )
     assert ended(code) == (130, "", "")

@@ -92,7 +92,7 @@ class Host:
         )
         return process
 
-    def run(self, *words: str, within: float = 30.0) -> subprocess.CompletedProcess[str]:
+    def run(self, *words: str, within: float = 120.0) -> subprocess.CompletedProcess[str]:
         """Run a program here until it ends."""
         return subprocess.run(
             self.inside(*words),

@@ -23,14 +23,14 @@ from typing import NamedTuple
 
 import zenoh
 
-from holozen.messages import Odometry, TriggerReply, TriggerRequest
+from holozen.messages import TriggerReply, TriggerRequest
 from holozen.messages import simulation_interfaces as si
-from holozen.testing import Process, Wire, wait_for
+from holozen.testing import Process, Wire
 from holozen.transport.errors import BusError, ServiceError
 from holozen.transport.samples import Sample, Stamp
 from tests.integration.robots import sent_at
 
-from .history import STEP, History, Violation, whole_lines
+from .history import STEP, History, Violation, wait_for_motion, whole_lines
 from .proxy import Proxy
 
 HERE = Path(__file__).parent
@@ -84,7 +84,6 @@ class Soak:
         self.sim.wait_for_line("listens on cmd_vel", 60)
         assert wire.run("param", "set", "sim", "odometry_rate", f"{1 / STEP:g}").returncode == 0
         self._bus = wire.bus("soak")
-        self._odom = self._bus.latest("odom", Odometry)
         self.observer = Process([sys.executable, str(HERE / "observer.py"), wire.endpoint])
         self.drivers: list[Process] = []
         self.names: list[str] = []
@@ -124,7 +123,7 @@ class Soak:
             self.look,
         ]
         self.drive()
-        wait_for(self._moves, what="motion")  # else a short run may try nothing
+        wait_for_motion(self.observer, 0.0)  # else a short run may try nothing
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             if not self.figures or time.monotonic() - self.figures[-1].at > EVERY:
@@ -139,10 +138,6 @@ class Soak:
             driver.close()
         time.sleep(1.0)  # in which it has to stand
         self.observer.close()
-
-    def _moves(self) -> bool:
-        odom = self._odom.read()[0]
-        return odom is not None and odom.twist.twist.linear.x != 0.0
 
     @property
     def _alive(self) -> list[Process]:
@@ -195,14 +190,14 @@ class Soak:
         """Stop and release the robot. Afterwards only a driver that has let go may drive, so these
         end.
         """
-        self._bus.call("stop", TriggerRequest(), TriggerReply)
+        self._bus.call("stop", TriggerRequest(), TriggerReply, 20.0)
         since = time.monotonic()
         time.sleep(self.random.uniform(0.1, 1.0))
         self.stopped.append((since, time.monotonic()))
         self.kill()
-        self._bus.call("release", TriggerRequest(), TriggerReply)
+        self._bus.call("release", TriggerRequest(), TriggerReply, 20.0)
         with contextlib.suppress(ServiceError):  # someone drives
-            self._bus.call("resume", TriggerRequest(), TriggerReply)
+            self._bus.call("resume", TriggerRequest(), TriggerReply, 20.0)
 
     def spawn(self) -> None:
         unused = sorted({*NAMES} - {*self.names})

@@ -3,7 +3,6 @@
 import json
 import signal
 import socket
-import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -14,6 +13,7 @@ import pytest
 from holozen.bus import Bus
 from holozen.messages import Odometry
 from holozen.testing import Process, Wire, wait_for
+from holozen.testing.process import run
 from holozen.testing.wire import command
 from holozen.transport.connection import Connection
 
@@ -78,6 +78,11 @@ def test_what_waits_for_an_answer_ends_at_once_on_a_signal(
         assert "Traceback" not in sim.err
 
 
+def notes(err: str) -> list[str]:
+    """What a verb wrote on standard error, but for whom it waited, as it does on a busy machine."""
+    return [line for line in err.splitlines() if not line.startswith("waiting for ")]
+
+
 DEAF = """
 import socket, sys, time
 server = socket.create_server(("127.0.0.1", int(sys.argv[1])))
@@ -103,9 +108,9 @@ def test_processes_meet_though_others_do_not_answer(wire: Wire, others: str) -> 
         asleep(wire)
         asleep(wire)
     wire.start("sim").wait_for_line("listens on")
-    verbs = [("topic", "list"), ("topic", "echo", "odom", "--once", "--timeout", "5"), ("stop",)]
+    verbs = [("topic", "list"), ("topic", "echo", "odom", "--once", "--timeout", "20"), ("stop",)]
     topics, echo, stop = (wire.start(*words) for words in verbs)
-    assert (topics.wait(), topics.err) == (0, "")
+    assert (topics.wait(), notes(topics.err)) == (0, [])
     assert "odom" in topics.out.split()
     assert echo.wait() == 0
     assert stop.wait() == 0
@@ -199,16 +204,11 @@ def test_an_access_control_list_has_to_allow_the_tokens_of_nodes(
         router.wait_for_line("listens at")
         with Process(command("sim", *client)) as sim:
             sim.wait_for_line("listens on")
-            listed = subprocess.run(
-                command("topic", "list", *client), capture_output=True, text=True, timeout=30
-            )
-            stop = subprocess.run(
-                command("stop", *client), capture_output=True, text=True, timeout=30
-            )
+            listed, stop = (run(command(*verb, *client), 60) for verb in VERBS)
     assert stop.stdout in STOPPED
     if len(allowed) > 1:
         assert "odom" in listed.stdout.split()
-        assert (stop.stderr, stop.returncode) == ("", 0)
+        assert (notes(stop.stderr), stop.returncode) == ([], 0)
     else:
         assert "it has to allow @holozen/**" in listed.stderr
         assert "other robots may not have been discovered" in stop.stderr

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from collections.abc import Callable
 
 CODE = """
 import sys, threading
@@ -25,8 +26,10 @@ for thread in threads:
 """
 
 
-def test_threads_that_decode_the_first_message_of_a_type_do_not_crash() -> None:
-    for _ in range(10):
+def test_threads_that_decode_the_first_message_of_a_type_do_not_crash(
+    trials: Callable[[int, int], int],
+) -> None:
+    for _ in range(trials(4, 20)):
         done = subprocess.run(
             [sys.executable, "-c", CODE], capture_output=True, text=True, timeout=60
         )

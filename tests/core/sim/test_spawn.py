@@ -114,21 +114,16 @@ def test_a_namespace_in_the_file_is_as_good_as_a_name(
 def test_a_second_sim_of_the_same_robot_is_refused(wire: Wire, bus: Bus, ground: World) -> None:
     first = wire.bus("first_sim")
     spawn(first, ground, wanted((HB_BOT, "Fred")))
-    wait_for(bus.connected)
-    wait_for(bus.graph().endpoints)
     reported = (
         rf": Fred/odom is published by first_sim \({first.id[:6]}\) already; end that one, "
         r"or use another name"
     )
-
-    def refused() -> bool:
-        with closing(World(WorldSpec())) as second, pytest.raises(RobotError, match=reported):
-            spawn(bus, second, wanted((HB_BOT, "Fred")))
-        return True
-
-    assert refused()
     with closing(World(WorldSpec())) as second:
-        assert len(spawn(bus, second, wanted((HB_BOT, "Ann")))) == 1
+        entities = Entities(bus, second, (5.0, 10.0))
+        wait_for(lambda: entities.others.publish("Fred/odom"), what="the first sim to be known")
+        with pytest.raises(RobotError, match=reported):
+            spawn_all(entities, wanted((HB_BOT, "Fred")))
+        assert len(spawn_all(entities, wanted((HB_BOT, "Ann")))) == 1
 
 
 @pytest.mark.parametrize(

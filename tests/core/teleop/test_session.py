@@ -5,7 +5,6 @@ otherwise nothing.
 import gc
 import itertools
 import math
-import time
 import weakref
 from collections.abc import Callable
 from typing import TypeVar
@@ -36,8 +35,15 @@ from services.teleop.input.kitty import Answer, Focus, Key, Unknown
 from services.teleop.session import BLIND, RESET, RESUME_TIMEOUT, SWITCHING, RobotClient, Session
 from services.teleop.telemetry import Refusals, Telemetry, Track
 from services.teleop.view import State
+from tests.core.teleop.paced import now, set_pace
 
 T = TypeVar("T")
+
+
+@pytest.fixture(autouse=True)
+def clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The teleop gives up after a second what it waits for, which a busy machine may take away."""
+    set_pace(monkeypatch)
 
 
 class Robot:
@@ -105,19 +111,19 @@ def publish_place(session: Session, robot: Robot, stamp: float, x: float) -> Non
     odom.header.stamp, odom.pose.pose.position.x = Time.of(stamp), x
     robot.odom.put(odom)
     wait_for(lambda: session.client.odom.count > before)
-    session.tick(time.monotonic())
+    session.tick(now())
 
 
 def press(session: Session, key: str) -> None:
     """Type a key, in a terminal that reports no releases."""
-    session.take(Key(key, key), time.monotonic())
+    session.take(Key(key, key), now())
 
 
 def tick(session: Session, until: Callable[[], T]) -> T:
     """Tick until `until()` is true."""
 
     def look() -> T:
-        session.tick(time.monotonic())
+        session.tick(now())
         return until()
 
     return wait_for(look)
@@ -126,7 +132,7 @@ def tick(session: Session, until: Callable[[], T]) -> T:
 def test_an_idle_teleop_publishes_nothing(wire: Wire, robot: Robot) -> None:
     session = session_of(wire, robot, Settings(repeat_rate=1000))
     for _ in range(50):
-        session.tick(time.monotonic())
+        session.tick(now())
     press(session, "q")
     session.let_go()
     session.halt()
@@ -153,7 +159,7 @@ def test_with_a_rate_of_zero_only_a_change_is_published(wire: Wire, robot: Robot
     session = session_of(wire, robot)
     press(session, "i")
     for _ in range(100):
-        session.tick(time.monotonic())
+        session.tick(now())
     press(session, "j")
     assert [robot.commands.recv().message for _ in range(2)] == [
         Twist.planar(0.5),
@@ -182,7 +188,7 @@ def test_a_stop_is_repeated_until_odom_that_is_newer_shows_rest(
     tick(session, lambda: not session.mapper.engaged)
     robot.heard()
     for _ in range(20):
-        session.tick(time.monotonic())
+        session.tick(now())
     assert session.sent is None
 
 
@@ -192,7 +198,7 @@ def test_odom_from_before_the_stop_is_no_proof_of_rest(wire: Wire, robot: Robot)
     see(session, robot, RESTS / 2)
     press(session, "i")
     press(session, "k")
-    session.tick(time.monotonic())
+    session.tick(now())
     assert session.mapper.engaged
 
 
@@ -216,27 +222,33 @@ def test_rest_counts_once_the_robot_can_have_heard_the_stop(wire: Wire, robot: R
     assert rests(CommandSource(session.bus.source, delay=1e-6))
 
 
-@pytest.mark.parametrize("speed", [(0.02, 0, 0), (0, -0.02, 0), (0, 0, 0.02)])
-def test_a_robot_that_moves_in_any_way_does_not_rest(
-    wire: Wire, robot: Robot, speed: tuple[float, float, float]
-) -> None:
+def test_a_robot_that_moves_in_any_way_does_not_rest(wire: Wire, robot: Robot) -> None:
     session = session_of(wire, robot)
-    press(session, "k")
-    see(session, robot, *speed)
-    session.tick(time.monotonic())
-    assert session.mapper.engaged
+    for speed in [(0.02, 0, 0), (0, -0.02, 0), (0, 0, 0.02)]:
+        press(session, "k")
+        see(session, robot, *speed)
+        session.tick(now())
+        assert session.mapper.engaged, speed
 
 
-def test_halt_stops_a_robot_and_returns_when_it_rests(wire: Wire, robot: Robot) -> None:
+def test_halt_stops_a_robot_and_returns_when_it_rests(
+    wire: Wire, robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    set_pace(monkeypatch, sleep=now.sleep)
     session = session_of(wire, robot)
     press(session, "i")
     see(session, robot, 0.5)
     wait_for(robot.heard)
     session.halt()  # no odom reports rest: given up after a second
-    heard = robot.heard()
-    assert len(heard) > 10
-    assert set(map(str, heard)) == {str(Twist())}
     assert not session.mapper.engaged
+    heard = list[Twist | TwistStamped | None]()
+
+    def heard_many() -> bool:
+        heard.extend(robot.heard())
+        return len(heard) > 10
+
+    wait_for(heard_many)
+    assert set(map(str, heard)) == {str(Twist())}
 
 
 def test_a_robot_that_is_left_leaves_no_reader_in_the_bus(wire: Wire) -> None:
@@ -267,7 +279,7 @@ def test_stamped_commands_have_the_time_and_the_frame(wire: Wire, robot: Robot) 
 def telemetry_of() -> Callable[[Session], Callable[[], State]]:
     def make(session: Session) -> Callable[[], State]:
         telemetry = Telemetry(session)
-        return lambda: telemetry.state("why", time.monotonic(), ascii=False)
+        return lambda: telemetry.state("why", now(), ascii=False)
 
     return make
 
@@ -387,8 +399,9 @@ def test_a_refusal_is_shown_until_a_later_command_is_accepted() -> None:
 
 
 @pytest.fixture
-def resume(robot: Robot) -> list[str]:
+def resume(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Serves `resume`; a reason in the list is the next refusal."""
+    monkeypatch.setattr("services.teleop.session.RESUME_TIMEOUT", 30.0)
     reasons: list[str] = []
 
     def answer(_request: TriggerRequest) -> TriggerReply:
@@ -423,7 +436,7 @@ def test_the_resume_key_stops_the_robot_first(wire: Wire, robot: Robot, resume: 
     see(session, robot, 0.5)
     press(session, "r")
     for _ in range(10):
-        session.tick(time.monotonic())
+        session.tick(now())
     assert session.warning == ""  # not while it moves
     see(session, robot, 0.0)
     assert tick(session, lambda: session.warning) == "every source may drive"
@@ -437,7 +450,7 @@ def test_another_key_takes_the_resume_back(wire: Wire, robot: Robot, resume: lis
     press(session, "r")
     press(session, "i")
     for _ in range(10):
-        session.tick(time.monotonic())
+        session.tick(now())
     assert session.warning == ""
     assert session.sent == Twist.planar(0.5)
 
@@ -446,13 +459,13 @@ def test_steering_takes_the_resume_back(wire: Wire, robot: Robot, resume: list[s
     session = session_of(wire, robot)
     press(session, "i")
     see(session, robot, 0.5)
-    session.act("resume", time.monotonic())
-    session.steer((1.0, 0.0, 0.0), time.monotonic())
-    session.steer((0.0, 0.0, 0.0), time.monotonic())
+    session.act("resume", now())
+    session.steer((1.0, 0.0, 0.0), now())
+    session.steer((0.0, 0.0, 0.0), now())
     session.halt()
     see(session, robot, 0.0)
     for _ in range(10):
-        session.tick(time.monotonic())
+        session.tick(now())
     assert session.warning == ""
 
 
@@ -471,14 +484,14 @@ def test_without_odom_the_robot_stops_until_a_key_is_pressed_again(
     session = session_of(wire, robot, Settings(mode=LATCH, repeat_rate=1000))
     press(session, "i")
     see(session, robot, 0.5)
-    session.tick(time.monotonic())
+    session.tick(now())
     robot.heard()
     wait_for(lambda: session.client.odom.read()[1] > LOST)
     assert tick(session, lambda: session.warning) == BLIND
     assert not any(session.mapper.motion)
     press(session, "J")
     for _ in range(5):
-        session.tick(time.monotonic())
+        session.tick(now())
     assert session.sent == Twist.planar(0, 0.5), "driving without odom is allowed"
 
 
@@ -499,7 +512,7 @@ def test_a_robot_that_was_replaced_stands_until_a_key_is_pressed_again(
     assert tick(session, seen) == BLIND
     assert not any(session.mapper.motion)
     press(session, "J")
-    session.tick(time.monotonic())
+    session.tick(now())
     assert session.sent == Twist.planar(0, 0.5)
 
 
@@ -542,23 +555,19 @@ def test_a_robot_that_was_reset_near_its_start_stands_until_a_key_is_pressed_aga
     assert not any(session.mapper.motion)
 
 
-@pytest.mark.parametrize("event", [Focus(False), Unknown("CSI 9 z"), Key("escape")])
-def test_a_lost_focus_and_unknown_keys_are_a_stop(
-    wire: Wire, robot: Robot, event: Focus | Unknown | Key
-) -> None:
+def test_a_lost_focus_and_unknown_keys_are_a_stop(wire: Wire, robot: Robot) -> None:
     session = session_of(wire, robot)
-    press(session, "i")
-    assert robot.commands.recv().message == Twist.planar(0.5)
-    assert session.take(event, time.monotonic()) == ""
-    assert robot.commands.recv().message == Twist()
+    for event in (Focus(False), Unknown("CSI 9 z"), Key("escape")):
+        press(session, "i")
+        assert robot.commands.recv().message == Twist.planar(0.5), event
+        assert session.take(event, now()) == ""
+        assert robot.commands.recv().message == Twist(), event
 
 
-@pytest.mark.parametrize("event", [Focus(True), Focus(False), Answer("alive")])
-def test_an_unmapped_key_publishes_nothing_while_idle(
-    wire: Wire, robot: Robot, event: Focus | Answer
-) -> None:
+def test_an_unmapped_key_publishes_nothing_while_idle(wire: Wire, robot: Robot) -> None:
     session = session_of(wire, robot)
-    session.take(event, time.monotonic())
+    for event in (Focus(True), Focus(False), Answer("alive")):
+        session.take(event, now())
     press(session, "i")
     assert robot.commands.recv().message == Twist.planar(0.5)
 
@@ -571,7 +580,7 @@ def test_tab_stops_the_robot_and_goes_to_the_next_one(wire: Wire, robot: Robot) 
     see(session, robot, 0.5)
     press(session, "tab")
     for _ in range(5):
-        session.tick(time.monotonic())
+        session.tick(now())
     assert session.client.robot == "Fred", "not while it moves"
     see(session, robot, 0.0)
     tick(session, lambda: session.client.robot == "Ginger")

@@ -57,7 +57,7 @@ class Case:
         )
         return reply.return_code, [one.goal_id.uuid[15] for one in reply.goals_canceling]
 
-    def result(self, number: int, timeout: float = 5.0) -> int:
+    def result(self, number: int, timeout: float = 30.0) -> int:
         request = RESULT.Request(identity(number))
         return int(
             self.client.call(key_of("act", "get_result"), request, RESULT.Response, timeout).status

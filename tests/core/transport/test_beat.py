@@ -59,6 +59,13 @@ def stamp_of(commands: Subscription[Any]) -> Stamp:
     return received.stamp
 
 
+def wait_for_beat(sender: Publisher[Any]) -> None:
+    """Wait until a receiver's beat is heard. The first command waits for that too, but not for long
+    enough on a busy machine.
+    """
+    wait_for(lambda: sender.echoes and sender.echoes.heard, what="a beat")
+
+
 def forward(commands: Publisher[Twist]) -> bool:
     """Send a motion. True."""
     commands.put(FORWARD)
@@ -105,13 +112,17 @@ def test_a_receiver_beats_20_times_a_second_and_to_each_who_asks(wire: Wire) -> 
     answer = wait_for(lambda: beats_at(now + 1) and asked.try_recv())
     assert isinstance(answer, Sample) and answer.payload == b"%d" % (now + 1)
     assert heard.try_recv() is None
+    beats = []
     for step in range(1, 201):
         robot.beat.poll(now + step * PERIOD_NS // 10)
-    beats = [int(sample.payload) for _ in range(20) if (sample := wait_for(heard.try_recv))]
+        # each is read before the next: Zenoh drops those that its queue cannot hold
+        if step % 10 == 0 and (sample := wait_for(heard.try_recv)):
+            beats.append(int(sample.payload))
     assert heard.try_recv() is None
     assert {after - before for before, after in pairwise(beats)} == {PERIOD_NS}
     for _ in range(30):
         robot.beat.send(now + 21 * PERIOD_NS)  # events delay no later beat
+        wait_for(heard.try_recv)
     robot.beat.poll(now + 22 * PERIOD_NS)
     wait_for(lambda: (sample := heard.try_recv()) and int(sample.payload) == now + 22 * PERIOD_NS)
 
@@ -122,12 +133,13 @@ def test_a_command_returns_the_newest_beats_of_those_alone_who_obey_its_key(wire
     heard_of_other = other.bus.session.declare_publisher(beat_key(other.bus.id, "beat"))
     with beating(robot.beat), beating(other.beat):
         wait_for(lambda: commands.matched and commands.echoes and commands.echoes.heard)
-        began = boot_ns()
+        assert commands.echoes
+        ((_, newest),) = commands.echoes.newest()
         commands.put(FORWARD)
         first = robot.stamp()
-        assert [session for session, _ in first.echoes] == [robot.bus.id]
-        age = robot.beat.own.age(first.echoes)
-        assert age is not None and age <= (boot_ns() - began) * 1e-9 + 2 * PERIOD_NS * 1e-9
+        ((session, echoed),) = first.echoes
+        assert (session, echoed >= newest) == (robot.bus.id, True)
+        assert robot.beat.own.age(first.echoes) is not None
         wait_for(lambda: forward(commands) and robot.stamp().echoes[0][1] > first.echoes[0][1])
         assert not heard_of_other.matching_status.matching
         late = Receiver(wire, name="late")  # found by its token
@@ -152,7 +164,7 @@ def test_without_a_beat_only_stops_are_sent_which_is_reported(
 ) -> None:
     robot, driver = Receiver(wire), wire.bus("driver")
     commands = driver.publisher("cmd_vel", Twist)
-    wait_for(lambda: commands.matched)
+    wait_for(lambda: commands.matched and commands.echoes and commands.echoes.has_receiver)
     commands.put(Twist())
     assert robot.stamp() == Stamp(driver.id, 0, (), "driver")
     wait_for(lambda: forward(commands) and "waiting for the robot" in capsys.readouterr().err)
@@ -190,10 +202,12 @@ def test_a_command_that_waited_is_dated_back_and_the_next_is_no_older(wire: Wire
     robot = Receiver(wire)
     commands = wire.bus("driver").publisher("cmd_vel", Twist)
     with beating(robot.beat):
+        wait_for_beat(commands)
         commands.put(FORWARD)
         robot.stamp()
-    assert commands.echoes
-    ((session, newest),) = commands.echoes.newest()  # the last that is sent
+    robot.beat.send(newest := boot_ns())  # the last that is sent
+    session, echoes = robot.bus.id, commands.echoes
+    wait_for(lambda: echoes and echoes.newest() == ((session, newest),))
     made = []
     for waited in (0.2, 0.1, 0.3):
         commands.put(FORWARD, waited)
@@ -206,6 +220,7 @@ def test_goals_return_the_beat_of_those_who_drive_to_goals(wire: Wire) -> None:
     beat, goals = pilot.beat(GOAL_BEAT), pilot.subscribe("goal_pose", PoseStamped)
     setter = wire.bus("setter").publisher("goal_pose", PoseStamped)
     with beating(beat):
+        wait_for_beat(setter)
         setter.put(PoseStamped())
     age = beat.own.age(stamp_of(goals).echoes)
     assert age is not None and age < 60.0

@@ -294,7 +294,7 @@ def test_a_service_that_is_not_there_yet_is_waited_for(
         time.sleep(seconds)
 
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=time.monotonic, sleep=sleep))
-    assert caller.call("resume", TriggerRequest(), TriggerReply, 10) == TriggerReply()
+    assert caller.call("resume", TriggerRequest(), TriggerReply, 30) == TriggerReply()
     assert pauses
 
 
@@ -511,7 +511,7 @@ def test_a_client_waits_for_its_router_and_reports_it(
     with ThreadPoolExecutor() as pool:
         client = pool.submit(Bus, "client", Connection("client", connect=(wire.endpoint,)))
         wait_for(lambda: wire.endpoint in capsys.readouterr().err)
-        with Bus("router", Connection("router", listen=(wire.endpoint,))), client.result(10) as bus:
+        with Bus("router", Connection("router", listen=(wire.endpoint,))), client.result(30) as bus:
             wait_for(bus.connected)
 
 
@@ -541,7 +541,8 @@ def test_an_early_bus_that_is_interrupted_as_it_starts_leaves_no_thread_that_ope
         raise KeyboardInterrupt
 
     monkeypatch.setattr(session_module, "background", interrupted)
-    nowhere = Connection("client", connect=(wire.endpoint,))
+    quickly = ("connect/timeout_ms", "500")  # Zenoh tries for so long
+    nowhere = Connection("client", connect=(wire.endpoint,), cfg=(quickly,))
     before = threading.active_count()
     with pytest.raises(KeyboardInterrupt):
         Opening(nowhere, patience=60, early=True)
@@ -585,12 +586,12 @@ def test_a_request_with_an_unknown_field_is_refused_and_one_in_a_reply_ignored(
     server, caller = pair
     server.serve("next_goal", NextGoalRequest, NextGoalReply, lambda _: NextGoalReply(1.0)).start()
     with pytest.raises(ServiceError, match="unknown field `gaol`"):
-        module.call_bytes(caller, "next_goal", b'{"gaol": 1}', "application/json", 5.0)
+        module.call_bytes(caller, "next_goal", b'{"gaol": 1}', "application/json", 30.0)
     answer = b'{"success": true, "by": "a"}'
     newer = server.session.declare_queryable(
         "release", lambda query: query.reply("release", answer)
     )
-    assert caller.call("release", TriggerRequest(), TriggerReply, 5.0) == TriggerReply(True)
+    assert caller.call("release", TriggerRequest(), TriggerReply, 30.0) == TriggerReply(True)
     newer.undeclare()
 
 

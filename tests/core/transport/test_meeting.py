@@ -3,7 +3,9 @@
 import os
 import socket
 import threading
+import time
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import pytest
 
@@ -54,7 +56,12 @@ def test_an_id_is_greater_than_those_of_all_earlier_sessions() -> None:
     assert all(len(one) <= 32 and one[0] != "0" for one in ids)
 
 
-def test_one_process_at_a_time_joins_and_one_that_hangs_in_it_holds_up_no_other_for_long() -> None:
+def test_one_process_at_a_time_joins_and_one_that_hangs_in_it_holds_up_no_other_for_long(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    passed = 0.0
+    clock = SimpleNamespace(monotonic=lambda: passed, sleep=time.sleep)
+    monkeypatch.setattr(meeting, "time", clock)
     where = Connection(connect=(free_endpoint(),))._replace(listen=())
     where = where._replace(listen=where.connect)
     with meeting.turn(where):
@@ -70,7 +77,8 @@ def test_one_process_at_a_time_joins_and_one_that_hangs_in_it_holds_up_no_other_
         waiting.wait()
         other.join(0.01)
         assert other.is_alive()
-        other.join(10)
+        passed = meeting.TURN
+        other.join(30)
         assert not other.is_alive()
 
 

@@ -20,30 +20,36 @@ ENDS = """
 import threading, time
 from holozen.transport import session
 
+waited = threading.Event()
+
 def leave():
+    waited.wait()
     time.sleep({seconds})
     print("left", flush=True)
 
+session.LAST = {last}
 thread = threading.Thread(target=leave, daemon=True)
 thread.start()
 session.wait_for_threads((thread, None, threading.current_thread()), 0.01)
 print("waited", flush=True)
+waited.set()
 """
 
 
-def reported(seconds: float) -> list[str]:
-    words = [sys.executable, "-c", ENDS.format(seconds=seconds)]
+def reported(seconds: float, last: float) -> list[str]:
+    """What it prints whose thread takes so many seconds, and is waited for during the `last`."""
+    words = [sys.executable, "-c", ENDS.format(seconds=seconds, last=last)]
     return subprocess.run(
-        words, capture_output=True, text=True, check=True, timeout=60
+        words, capture_output=True, text=True, check=True, timeout=120
     ).stdout.split()
 
 
 def test_a_late_thread_may_leave_before_the_process_ends() -> None:
-    assert reported(0.2) == ["waited", "left"]
+    assert reported(0.1, 30.0) == ["waited", "left"]
 
 
 def test_a_hanging_thread_does_not_keep_the_process() -> None:
-    assert reported(3600) == ["waited"]
+    assert reported(3600, 0.1) == ["waited"]
 
 
 UNCLOSED = """
@@ -80,7 +86,7 @@ def test_a_program_that_leaves_its_bus_open_ends_as_any_other(
     wire: Wire, words: str, code: int
 ) -> None:
     run = [sys.executable, "-c", UNCLOSED + words, wire.endpoint]
-    done = subprocess.run(run, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(run, capture_output=True, text=True, timeout=120)
     assert (done.returncode, done.stdout) == (code, "")
     # from Python 3.12 on
     shown = [line for line in done.stderr.splitlines() if "use of fork() may lead" not in line]
@@ -106,7 +112,7 @@ def test_a_bus_that_is_closed_at_once_leaves_no_link(wire: Wire) -> None:
     buses = [wire.bus(name) for name in ("first", "second", "third", "fourth")]
     wait_for(lambda: len(buses[-1].session.info.peers_zid()) == 3)
     run = [sys.executable, "-c", SHORT_LIVES, wire.endpoint]
-    done = subprocess.run(run, capture_output=True, text=True, check=True, timeout=60)
+    done = subprocess.run(run, capture_output=True, text=True, check=True, timeout=120)
     assert max(map(int, done.stdout.split())) <= 3, done
 
 
@@ -149,7 +155,7 @@ for use in (lambda: Bus('child'), lambda: odom.put(Odometry()), lambda: bus.call
         [sys.executable, "-c", UNCLOSED + words, wire.endpoint],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=120,
     )
     assert done.stdout.split() == ["1"] * 6
     reason = "BusError: cannot use Zenoh in a process that was forked from one which has used it: "
@@ -160,4 +166,4 @@ def test_a_process_forked_before_the_first_bus_opens_its_own(wire: Wire) -> None
     program = UNCLOSED.replace("bus = ", "child = os.fork()\nbus = ")
     words = "if child: sys.exit(os.waitstatus_to_exitcode(os.wait()[1]))"
     run = [sys.executable, "-c", program + words, wire.endpoint]
-    assert subprocess.run(run, timeout=60).returncode == 0
+    assert subprocess.run(run, timeout=120).returncode == 0
