@@ -109,7 +109,7 @@ def _arguments(verb: str) -> Callable[[argparse.ArgumentParser], None]:
         if verb in ("add", "revoke"):
             add("name")
         if verb == "page":
-            add("name", nargs="?", default="operator", help="the member (default: %(default)s)")
+            add("name", nargs="?", default="operator", help="the member (default: operator)")
         if verb == "renew":
             add("names", nargs="*", metavar="NAME", help="a member (default: all)")
         if verb in ("init", "add", "renew", "page"):
@@ -136,13 +136,13 @@ VERBS = by_name(
             ),
             ("add", "add a member", "operator Ann", _add),
             ("renew", "issue new certificates to members, for the keys they have", "Ann", _renew),
+            ("revoke", "remove a member; the router starts anew without it", "Ann", _revoke),
             (
                 "page",
                 "make the certificate with which a member's view serves https",
                 "--host robot.local",
                 _page,
             ),
-            ("revoke", "remove a member; the router starts anew without it", "Ann", _revoke),
             ("show", "list the members, their roles and when their certificates expire", "", _show),
         )
     ),

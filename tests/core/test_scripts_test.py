@@ -32,7 +32,11 @@ def test_ctrl_c_while_the_tests_are_collected_leaves_no_process_behind(tmp_path:
     for folder in ("scripts", ".venv/bin", "started"):
         (tmp_path / folder).mkdir(parents=True)
     shutil.copy(REPO / "scripts" / "test", tmp_path / "scripts" / "test")
-    programs = {".venv/bin/python": WAITS, "scripts/check": CHECK, "scripts/venv": "#!/bin/sh\n"}
+    programs = {
+        ".venv/bin/python": WAITS,
+        "scripts/check": CHECK,
+        **dict.fromkeys(("scripts/venv", "scripts/parts"), "#!/bin/sh\n"),
+    }
     for name, text in programs.items():
         (tmp_path / name).write_text(text)
         (tmp_path / name).chmod(0o755)

@@ -596,9 +596,6 @@ def mecanum_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
                 f"is a second wheel at one corner; only {cut(named[0])} drives",
             )
         corners.append(named[0])
-    carriers = {joint.parent for joint in joints.values() if joint.kind == "continuous"}
-    if all(joints[name].child in carriers for name in corners):
-        return _gz_drive(settings, Omni(encoder=True), source)
     front_left, front_right, back_left, back_right = corners
     wheels = Mecanum(
         front_left,
@@ -609,6 +606,9 @@ def mecanum_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
         wheelbase=settings.length("wheelbase"),
         radius=settings.length("wheel_radius"),
     )
+    carriers = {joint.parent for joint in joints.values() if joint.kind == "continuous"}
+    if all(joints[name].child in carriers for name in corners):
+        return _gz_drive(settings, Omni(encoder=True), source)
     return _gz_drive(settings, wheels, source)
 
 

@@ -23,7 +23,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """A busy machine is waited for: each verdict comes here."""
     for name in ("publish.VERDICT_WITH_STATUS", "publish.VERDICT_WITHOUT_STATUS"):
         monkeypatch.setattr(f"holozen.cli.{name}", PATIENCE)
-    for name in ("FRESH", "HOLDING"):
+    for name in ("FRESH", "HELD_WITHIN"):
         monkeypatch.setattr(f"holozen.command.feedback.{name}", PATIENCE)
 
 

@@ -115,7 +115,8 @@ def test_a_root_without_mass_is_reported_and_refused_where_wheels_have_to_push_i
         f"{ORIGIN}, line 2: <link name='a'> is the root and has no mass, nor have the links "
         "fixed to it; "
     )
-    (warning,) = robot(*parts, drive("libgazebo_ros_planar_move.so")).warnings
+    warnings = robot(*parts, drive("libgazebo_ros_planar_move.so")).warnings
+    (warning,) = (each for each in warnings if "changes nothing" not in each)
     assert (
         warning == f"{message}Gazebo drops such a robot, but it is kept here: give it an <inertial>"
     )

@@ -63,12 +63,11 @@ def test_the_controller_drives_round_the_shape_of_the_service_node(
             )
             odoms, corners = robot.odom.from_now(), goals(town)
             assert len(corners) == {"triangle": 3, "square": 4, "hexagon": 6}[shape]
-            left, seen = [*corners, corners[0]], 0
+            left, looked_at = [*corners, corners[0]], list[Odometry]()
 
             def has_been_round() -> bool:
-                nonlocal seen
-                new = odoms.messages()[seen:]
-                seen += len(new)
+                new = odoms.messages()[len(looked_at) :]
+                looked_at.extend(new)
                 for odom in new:
                     if left and is_at(odom, left[0]):
                         del left[0]
