@@ -8,7 +8,7 @@ from holozen.background import background
 from holozen.bus import Bus
 from holozen.process import deferred_interrupt
 from holozen.suggest import suggest
-from holozen.transport.errors import BusError
+from holozen.transport.errors import BusError, NoReply
 from holozen.transport.graph import UNREACHED
 
 if TYPE_CHECKING:
@@ -82,6 +82,12 @@ class Nodes:
             return self._bus.call(f"{node}/{verb}", request(*fields), reply, self._timeout)
         except CodecError as error:
             raise BusError(str(error)) from None
+        except NoReply:  # it was there a moment ago
+            if not (found := self.sessions.get(node)):
+                raise
+            what = f"no reply from '{node}/{verb}' within {self._timeout:g} s"
+            hung = UNREACHED.format(source=f"{node}@{found[0]}")
+            raise BusError(f"{what}: {hung}") from None
 
     def _known(self, name: str) -> str:
         if not self.sessions:

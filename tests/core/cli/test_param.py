@@ -199,10 +199,14 @@ def test_two_nodes_of_the_same_name_are_not_asked(run: Run, node: Node, wire: Wi
 
 
 def test_a_node_that_does_not_answer_is_reported(run: Run, wire: Wire) -> None:
-    Parameters(wire.bus("sim"), "sim", lambda: [])  # `answer` is never called
+    bus = wire.bus("sim")
+    Parameters(bus, "sim", lambda: [])  # `answer` is never called
     code, _, err = run("param", "get", "sim", "speed", "--timeout", "0.2")
     assert code == 1
-    assert err.startswith("holozen param get: no reply from 'sim/get_parameters' within 0.2 s")
+    assert err.startswith(
+        "holozen param get: no reply from 'sim/get_parameters' within 0.2 s: "
+        f"{bus.source} does not answer: it hangs"
+    )
 
 
 def test_help_shows_examples(capsys: pytest.CaptureFixture[str]) -> None:
