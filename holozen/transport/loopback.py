@@ -12,6 +12,8 @@ from holozen.system import IS_LINUX
 from holozen.transport.connection import GROUP, HOST, socket_path
 
 IN_USE = os.strerror(errno.EADDRINUSE)
+LOOKS = 6  # at a table of the kernel that is longer than a page
+PAGE = 1 << 16  # bytes; no page is longer
 _HERE = _socket.inet_aton(HOST)
 # SO_BINDTODEVICE of Linux, IP_BOUND_IF of macOS; not in `socket` on all systems
 _BIND_TO_DEVICE, _BOUND_IF = (25, 25)
@@ -66,11 +68,28 @@ def _is_of_scouting(one: _socket.socket) -> bool:
 def sockets(port: int) -> list[tuple[str, int]]:
     """The sockets in a group, as /proc/PID/fd names them, with their users' ids. Raises OSError
     where none knows.
+
+    The kernel gives its table a page at a time, and leaves one out where another has just gone. So
+    a longer table is read LOOKS times, and what any look shows is there.
     """
-    wanted = f"{int.from_bytes(_socket.inet_aton(GROUP), sys.byteorder):08X}:{port:04X}"
-    with open("/proc/net/udp") as table:
-        rows = [row for line in table if (row := line.split())[1] == wanted]
-    return [(f"socket:[{row[9]}]", int(row[7])) for row in rows]
+    wanted = f"{int.from_bytes(_socket.inet_aton(GROUP), sys.byteorder):08X}:{port:04X}".encode()
+    found = dict[tuple[str, int], None]()
+    for _ in range(LOOKS):
+        pages = _pages("/proc/net/udp")
+        rows = [row for line in b"".join(pages).splitlines() if (row := line.split())[1] == wanted]
+        found |= dict.fromkeys((f"socket:[{row[9].decode()}]", int(row[7])) for row in rows)
+        if len(pages) == 1:
+            break
+    return [*found]
+
+
+def _pages(path: str) -> list[bytes]:
+    """A table of the kernel, as it was read."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        return [*iter(lambda: os.read(descriptor, PAGE), b"")]
+    finally:
+        os.close(descriptor)
 
 
 def listen_error(endpoint: str) -> str:
