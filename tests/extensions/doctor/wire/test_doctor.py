@@ -153,6 +153,7 @@ def test_a_holder_of_the_port_that_speaks_no_zenoh_is_named(
 
 def test_a_sleeping_holder_of_the_port_is_to_be_woken(verb: Verb, wire: Wire) -> None:
     router = wire.start("router")
+    router.wait_for_line("listens at")  # else the doctor may take the port before it does
     wait_for(lambda: "speaks Zenoh" in str(doctor(verb, wire)[1]))
     router.signal(signal.SIGSTOP)
     _, rows = doctor_when_bad(verb, wire, "port")
