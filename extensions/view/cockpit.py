@@ -95,10 +95,19 @@ class Cockpit:
 
     async def _draw(self, now: float, news: News) -> None:
         pages = [seat.page for seat in list(self._seats.values())]
+        without_sim = {
+            name: one.entity.odometry
+            for name, one in self._scene.shown.items()
+            if not one.entity.number
+        }
         self._scene.draw(
             now, news, {page.robot: driver for page in pages if (driver := page.driver)}
         )
+        names = {one.entity.odometry: name for name, one in self._scene.shown.items()}
         for page in pages:
+            # Odometry may be heard before its sim is, and then its robot gets its name: a page that
+            # has chosen it goes on with it.
+            page.choose(names.get(without_sim.get(page.robot, ""), page.robot))
             page.update()
         self._drivers.keep([page.driver for page in pages])
 

@@ -425,6 +425,21 @@ def test_an_old_picture_is_covered_and_who_drives_by_it_stops(
     page.locator("#picture").wait_for(state="hidden")
 
 
+def test_a_robot_that_was_heard_before_its_sim_stays_chosen(wire: Wire, opened: Open) -> None:
+    page = opened(address(wire.start("view", "--port", "0")), ready="")
+    with wire.bus("base") as base:
+        odom = base.publisher("odom", Odometry)
+
+        def has_chosen() -> bool:
+            odom.put(Odometry())
+            return page.locator("#driver:text('ready')").is_visible()
+
+        wait_for(has_chosen)
+    wire.start("sim")
+    page.locator("#robots").get_by_text("hb_bot").wait_for()
+    page.locator("#driver:text('ready')").wait_for()
+
+
 def test_without_a_robot_a_sheet_says_so_until_one_comes(wire: Wire, opened: Open) -> None:
     page = opened(address(wire.start("view", "--port", "0")), ready="")
     page.get_by_text("No robot is heard.").wait_for()
