@@ -107,7 +107,8 @@ class Cockpit:
         for page in pages:
             # Odometry may be heard before its sim is, and then its robot gets its name: a page that
             # has chosen it goes on with it.
-            page.choose(names.get(without_sim.get(page.robot, ""), page.robot))
+            if odometry := without_sim.get(page.robot):
+                page.choose(names.get(odometry, page.robot))
             page.update()
         self._drivers.keep([page.driver for page in pages])
 
