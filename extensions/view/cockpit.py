@@ -95,20 +95,21 @@ class Cockpit:
 
     async def _draw(self, now: float, news: News) -> None:
         pages = [seat.page for seat in list(self._seats.values())]
+        # Odometry may be heard before its sim is, and then its robot gets its name: a page that has
+        # chosen it goes on with it.
         without_sim = {
-            name: one.entity.odometry
-            for name, one in self._scene.shown.items()
-            if not one.entity.number
+            page: shown.entity.odometry
+            for page in pages
+            if (shown := page.shown()) and not shown.entity.number
         }
         self._scene.draw(
             now, news, {page.robot: driver for page in pages if (driver := page.driver)}
         )
-        names = {one.entity.odometry: name for name, one in self._scene.shown.items()}
+        for page, odometry in without_sim.items():
+            for name, one in self._scene.shown.items():
+                if one.entity.odometry == odometry:
+                    page.choose(name)
         for page in pages:
-            # Odometry may be heard before its sim is, and then its robot gets its name: a page that
-            # has chosen it goes on with it.
-            if odometry := without_sim.get(page.robot):
-                page.choose(names.get(odometry, page.robot))
             page.update()
         self._drivers.keep([page.driver for page in pages])
 

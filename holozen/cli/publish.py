@@ -380,7 +380,7 @@ def command_feedback(bus: Bus, key: str, is_velocity: bool = True) -> CommandFee
 
 def _is_paused(bus: Bus, status_key: str) -> bool:
     """Whether a sim that publishes the command status on this key is paused. One that does not
-    answer is not.
+    answer is not. As `entities.is_paused`, whose module takes half as long to load as a verb takes.
     """
     ends = bus.endpoints()
     sims = {end.session for end in on_key(ends, status_key, "pub")}
