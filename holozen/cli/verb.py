@@ -2,8 +2,6 @@
 the flags need.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import re
@@ -209,7 +207,7 @@ class Service(Noun):
     one.
     """
 
-    def __init__(self, name: str, module: ModuleType, modules: Mapping[str, str]) -> None:
+    def __init__(self, name: str, module: "ModuleType", modules: Mapping[str, str]) -> None:
         super().__init__(name, "", dict(modules))
         self.module = module
 
@@ -317,7 +315,7 @@ def on_node(module: str, function: str) -> Callable[[argparse.Namespace], int]:
     return run
 
 
-def open_bus(args: argparse.Namespace, stop: threading.Event | None = None) -> Bus:
+def open_bus(args: argparse.Namespace, stop: threading.Event | None = None) -> "Bus":
     """The bus of a verb, connected according to its flags. The session opens while this and the
     caller import modules. `stop` as in Opening.
     """

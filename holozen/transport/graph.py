@@ -5,8 +5,6 @@ A token's key is `@holozen/<session>/<node>/<kind>/<package>/<msg, srv or action
 them from a plain `**`.
 """
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import json
@@ -14,7 +12,7 @@ import os
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 from holozen.transport.errors import BusError
 from holozen.transport.samples import Answers, source
@@ -176,7 +174,7 @@ class Graph:
         self._sort_due = 0.0  # s; until then the endpoints stay as they were
         self._gone: deque[Endpoint] = deque(maxlen=MAX_GONE)
 
-    def __enter__(self) -> Graph:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_error: object) -> None:

@@ -1,7 +1,5 @@
 """Samples and replies as bytes: what they carry besides their payload, and what waits for them."""
 
-from __future__ import annotations
-
 import contextlib
 import re
 import threading
@@ -343,7 +341,7 @@ class Ring:
     A flood pushes nothing out that came on another key, or with a higher priority.
     """
 
-    def __init__(self, dealer: Dealer, key: str, depth: int) -> None:
+    def __init__(self, dealer: "Dealer", key: str, depth: int) -> None:
         self.dealer, self.key, self.handler, self._depth = dealer, key, self, depth
         self._waiting: dict[int, deque[Any]] = {}  # by priority, the strongest first
 
