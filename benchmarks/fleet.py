@@ -112,7 +112,7 @@ def measure(robots: int, turns: int, steps: int) -> tuple[Case, dict[str, float]
     """One fleet: its case, and the figures without a comparison."""
     model = load(ROBOT)
     assert model.drive is not None
-    model = replace(model, drive=replace(model.drive, odometry_rate=20.0, command_timeout=-1.0))
+    model = replace(model, drive=replace(model.drive, odometry_rate=20.0, command_timeout=None))
     endpoint, before = meeting_point(), resident()
     with Bus("sim", host(endpoint)) as bus, closing(World(WORLD)) as world:
         start = time.process_time()
