@@ -156,7 +156,7 @@ def _short(value: float) -> str:
 
 FARTHEST = 1e6  # m; farther points are not drawn
 STEP = 12  # dots from one point of the grid to the next; a whole number of characters both ways
-FINEST = 0.5  # m between the points of the grid, at least
+FINEST = 0.2  # m between the points of the grid, at least
 # dots and radians from the centre: tip, and the two ends of the tail
 ARROW = ((5.0, 0.0), (4.0, 2.5), (4.0, -2.5))
 MARGIN = 6  # dots around everything, for letters and names

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import threading
 import time
 from collections import deque
@@ -133,51 +132,20 @@ def _plane_as_json(plane: Plane) -> dict[str, object]:
     return {"robots": robots, "goals": plane.goals, "objects": plane.objects, "seen": seen}
 
 
-class Scanner:
-    """The points that a lidar sees, in the frame of its robot's odometry."""
-
-    def __init__(self, bus: Bus, key: str, namespace: str) -> None:
-        from holozen.frames import RobotFrames  # while the session opens
-        from holozen.messages import LaserScan
-        from holozen.wire import key_for
-
-        self._scans = bus.state(key, LaserScan)
-        self._frames = RobotFrames(bus, namespace, key_for("odom", namespace))
-        self.points: list[Point] = []  # of the newest scan
-
-    def take(self) -> None:
-        """Take in the newest scan."""
-        self._frames.update()
-        if (received := self._scans.try_recv()) and (scan := received.message):
-            if (at := self._frames.of(scan.header.frame_id, self._frames.root)) is None:
-                return
-            self.points = []
-            for index, far in enumerate(scan.ranges):
-                if scan.range_min <= far <= scan.range_max:
-                    angle = scan.angle_min + index * scan.angle_increment
-                    self.points.append(
-                        at.apply((far * math.cos(angle), far * math.sin(angle), 0.0))[:2]
-                    )
-
-    def close(self) -> None:
-        """Stop listening."""
-        self._scans.close()
-        self._frames.close()
-
-
 class Watcher:
     """Follows the odometry of all robots and the scans of their lidars, and asks for goals and
     objects in a thread.
     """
 
     def __init__(self, bus: Bus) -> None:
-        from holozen.messages import CommandStatus, Odometry
+        from holozen.messages import CommandStatus, Odometry  # while the session opens
+        from holozen.scanners import Scanners
 
         self.poses: dict[str, tuple[float, float, float]] = {}  # x, y, yaw by a robot's name
         self.goals: list[Point] = []
-        self._changes = 0  # of the graph, when it was looked at for lidars
+        self._looked: int | None = None  # at the graph for lidars, by its `seen`
         self.objects: dict[str, Point] = {}
-        self._graph, self._scanners = bus.graph(), dict[str, Scanner]()
+        self._graph, self._scanners = bus.graph(), Scanners(bus)
         self._ends = self._graph.settled(bus.connected)
         self._bus, self._odom = bus, bus.subscribe("**/odom", Odometry, depth=1024)
         self._trails: dict[str, deque[Point]] = {}
@@ -190,11 +158,10 @@ class Watcher:
     def take(self) -> None:
         """Take in the odometry and scans that wait."""
         self._ends = self._graph.endpoints()
-        if self._changes != self._graph.changes:
-            self._changes = self._graph.changes
-            self._follow_scanners()
-        for scanner in self._scanners.values():
-            scanner.take()
+        if self._looked != self._graph.seen:
+            self._looked = self._graph.seen
+            self._scanners.follow(self._ends)
+        self._scanners.take()
         while (received := self._odom.try_recv()) is not None:
             if received.message is not None:
                 name = received.key.removesuffix("odom").removesuffix("/")
@@ -213,8 +180,7 @@ class Watcher:
         }
         first = ", ".join(map(_place, robots[:MAX_PLACES]))
         more = f" and {len(robots) - MAX_PLACES} more" if len(robots) > MAX_PLACES else ""
-        seen = [point for scanner in self._scanners.values() for point in scanner.points]
-        return Plane(robots, self.goals, others, first + more, seen)
+        return Plane(robots, self.goals, others, first + more, self._scanners.points)
 
     def join(self) -> None:
         """Wait for the polling thread once the bus is closed: no thread may be inside Zenoh at
@@ -222,21 +188,6 @@ class Watcher:
         """
         self._ended.set()
         self._asking.join(ASK_EVERY + PATIENCE)
-
-    def _follow_scanners(self) -> None:
-        from holozen.messages import LaserScan
-
-        published = [end for end in self._ends if end.kind == "pub"]
-        keys = {end.key for end in published if end.type == LaserScan.ROS and "*" not in end.key}
-        for gone in self._scanners.keys() - keys:
-            self._scanners.pop(gone).close()
-        robots = {end.key.removesuffix("odom") for end in published if end.key.endswith("odom")}
-        for new in keys - self._scanners.keys():
-            owners = [start for start in robots if new.startswith(start)]
-            if owners:
-                self._scanners[new] = Scanner(
-                    self._bus, new, max(owners, key=len).removesuffix("/")
-                )
 
     def _move(self, name: str, x: float, y: float, yaw: float) -> None:
         trail = self._trails.setdefault(name, deque(maxlen=TRAIL))

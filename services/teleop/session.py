@@ -52,6 +52,7 @@ class RobotClient:
         self._echoes.settle(0.0)  # a key waits for no beat
         self.status_key = f"{self.key}_status"
         self.name = ""  # in the sim; empty while it is not known
+        self.strafes = True  # as it has said last
         self._status = bus.latest(self.status_key, CommandStatus)
         self.odom = RobotFeedback(bus, self.beside("odom"), self._status)
 
@@ -74,6 +75,7 @@ class RobotClient:
         """The sim's last command status; empty if it is outdated."""
         status, age = self._status.read()
         self.name = status.name if status else ""
+        self.strafes = status.strafes if status else self.strafes
         return status if status and age < 3 * LOST else CommandStatus()
 
     def close(self) -> None:

@@ -8,6 +8,7 @@ from collections import deque
 from holozen.limits import STOP, Planar
 from holozen.messages import CommandStatus, Odometry, Twist
 from holozen.odometry import round_trip
+from holozen.scanners import Scanners
 
 from .control.twist_mapper import DEAD_MAN
 from .session import Session
@@ -80,18 +81,29 @@ class Telemetry:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._track, self._refusals, self._tracked = Track(), Refusals(), session.client
+        self._scanners = Scanners(session.bus, session.client.robot)
+        self._looked: int | None = None  # at the graph for lidars, by its `seen`
 
     def state(self, why: str, now: float, ascii: bool) -> State:
         """The state to show. `why` is the reason for the mode."""
         session, client = self._session, self._session.client
         if client is not self._tracked:
             self._track, self._refusals, self._tracked = Track(), Refusals(), client
+            self._scanners.close()
+            self._scanners, self._looked = Scanners(session.bus, client.robot), None
         odom, age = client.odom.read()
         if odom is not None:
             self._track.see(odom, now)
         status = client.status()
         refusal = self._refusals.see(status, session.bus.source)
-        settings = session.mapper.settings
+        settings, layout = session.mapper.settings, session.mapper.layout
+        if not client.strafes:
+            layout = layout.without_strafing
+        ends = session.graph.endpoints()
+        if session.graph.seen != self._looked:
+            self._looked = session.graph.seen
+            self._scanners.follow(ends)
+        self._scanners.take()
         return State(
             robot=client.robot,
             name=client.name or client.robot,
@@ -104,10 +116,11 @@ class Telemetry:
             real_time_factor=self._track.real_time_factor(),
             pose=self._track.pose,
             trail=self._track.trail,
+            seen=self._scanners.points,
             listeners=session.listeners(),
             source=session.bus.source,
             key=client.key,
-            keys=session.mapper.layout.table if session.help else session.mapper.layout.help,
+            keys=layout.table if session.help else layout.help,
             help=session.help,
             warning=session.warning or _unmoved(session, status) or refusal,
             why=why,

@@ -62,6 +62,7 @@ class State(Struct):
     paused: bool = False  # whether the sim is
     pose: tuple[float, float, float] | None = None  # x, y, yaw in the frame of odom
     trail: Sequence[tuple[float, float]] = ()  # oldest first
+    seen: Sequence[tuple[float, float]] = ()  # by its lidars
     warning: str = ""  # the latest
     key: str = "cmd_vel"
     keys: list[str] = []  # help of the active layout, lines of at most 40 characters
@@ -557,6 +558,9 @@ def _cut(line: Line, columns: int) -> Line:
     return kept
 
 
+FAR_SIGHT = (
+    50  # columns of the map from which on it shows what lidars see, and so less of the track
+)
 PLACES = {"sign": "driving", "trail": "good", "grid": "dim", "": ""}
 """The styles of the map's parts while odom is current."""
 
@@ -571,7 +575,8 @@ def chart(state: State, columns: int, rows: int) -> list[Line]:
     if pose and not (max(map(abs, pose[:2])) < FARTHEST and math.isfinite(pose[2])):
         pose = None
     robot = Robot("", *(pose or (math.nan, math.nan, 0.0)), state.trail)
-    cells, scale = drawn(Plane([robot]), (columns, rows), state.ascii, grid=True)
+    seen = state.seen if columns >= FAR_SIGHT else ()
+    cells, scale = drawn(Plane([robot], seen=seen), (columns, rows), state.ascii, grid=True)
     styles = PLACES if state.known else dict.fromkeys(PLACES, "dim")
     lines: list[Line] = []
     for row in cells:
@@ -581,9 +586,18 @@ def chart(state: State, columns: int, rows: int) -> list[Line]:
 
 
 def _chart_caption(pose: tuple[float, float, float] | None, scale: str, columns: int) -> Line:
-    place = f"x {number(pose[0])} y {number(pose[1])}" if pose else "no pose yet"
-    turned = f"  {math.degrees(math.remainder(pose[2], math.tau)):+.0f} deg" if pose else ""
-    for text in (place + turned, place, ""):
+    """The pose and the scale; where there is no room for both, the pose."""
+    if pose is None:
+        place = ""
+        poses = ["no pose yet", place]
+    else:
+        place = f"x {short(pose[0])} y {short(pose[1])}"
+        turned = f" {math.degrees(math.remainder(pose[2], math.tau)):+.0f} deg"
+        poses = [f"x {number(pose[0])} y {number(pose[1])} {turned}", place + turned]
+    for text in poses:
         if len(text) + 2 + len(scale) <= columns:
             return [("", text), ("dim", scale.rjust(columns - len(text)))]
+    for text in (*poses, place):
+        if len(text) <= columns:
+            return [("", text)]
     return [("dim", scale[:columns].rjust(columns))]

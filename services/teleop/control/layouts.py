@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from functools import cached_property
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from ..toml_file import one_of
 
@@ -239,6 +240,11 @@ class Layout(Struct, frozen=True, dict=True):
             text = f"{meaning:<20} {' '.join([*keys, *([OTHER] if meaning == 'stop' else [])])}"
             lines += textwrap.wrap(text, WIDTH, subsequent_indent=" " * 21)
         return lines
+
+    @cached_property
+    def without_strafing(self) -> "Layout":
+        """What is left of it for a drive that cannot move sideways."""
+        return replace(self, moves={key: way for key, way in self.moves.items() if not way[1]})
 
     def key_for(self, typed: str, base: str) -> str:
         """The key of this layout that was pressed. `typed` is what it types, `base` what the same

@@ -144,6 +144,16 @@ def test_the_help_reads_well() -> None:
     ]
 
 
+def test_without_strafing_it_names_no_way_to_the_side() -> None:
+    planted = TTK.without_strafing
+    assert " ".join(planted.help).startswith("i/, forward/back   t/b up/down j/l turn")
+    assert not any(
+        word in " ".join([*planted.help, *planted.table])
+        for word in ("strafe", "diagonal", "+ left", "+ right")
+    )
+    assert planted.speeds == TTK.speeds and planted.actions == TTK.actions
+
+
 def test_a_press_means_a_key_of_the_layout() -> None:
     for keyboard, name, typed, base, key in [
         ("US", "ttk", "i", "i", "i"),

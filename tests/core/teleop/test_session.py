@@ -15,13 +15,19 @@ from holozen.bus import Bus
 from holozen.messages import (
     CommandSource,
     CommandStatus,
+    Header,
+    LaserScan,
     Odometry,
     SimulationStatus,
+    TFMessage,
     Time,
+    Transform,
+    TransformStamped,
     TriggerReply,
     TriggerRequest,
     Twist,
     TwistStamped,
+    Vector3,
 )
 from holozen.messages.simulation_interfaces import SimulationState
 from holozen.odometry import LOST, RESTS
@@ -330,6 +336,39 @@ def test_who_drives_is_told_what_slows_the_robot_down(
     robot.status(obeyed=session.bus.source)
     wait_for(lambda: state().obeyed == session.bus.source)
     assert state().warning == ""
+
+
+def test_a_robot_that_cannot_strafe_has_no_keys_for_that(
+    wire: Wire, robot: Robot, telemetry_of: Callable[[Session], Callable[[], State]]
+) -> None:
+    session = session_of(wire, robot)
+    state = telemetry_of(session)
+    assert "J/L strafe" in " ".join(state().keys)
+    robot.status(strafes=False)
+    wait_for(lambda: state().keys == TTK.without_strafing.help)
+    session.help = True
+    assert state().keys == TTK.without_strafing.table
+
+
+def test_what_its_lidar_sees_is_shown_where_it_is(
+    wire: Wire, robot: Robot, telemetry_of: Callable[[Session], Callable[[], State]]
+) -> None:
+    state = telemetry_of(session_of(wire, robot))
+    scans = robot.bus.publisher("Fred/scan", LaserScan)
+    frames = robot.bus.publisher("Fred/tf", TFMessage)
+    lidar = TransformStamped(
+        Header(frame_id="base"), "lidar", Transform(translation=Vector3(1.0, 2.0, 0.0))
+    )
+    scan = LaserScan(Header(frame_id="lidar"), range_max=9.0, ranges=[3.0, math.inf])
+
+    def sees() -> bool:
+        robot.odom.put(Odometry(Header(frame_id="odom"), "base"))
+        frames.put(TFMessage([lidar]))
+        scans.put(scan)
+        return bool(state().seen)
+
+    wait_for(sees)
+    assert list(state().seen) == pytest.approx([(4.0, 2.0)])
 
 
 def test_a_paused_sim_is_shown_until_it_goes_on_or_says_no_more(

@@ -312,7 +312,8 @@ def dots(state: State, style: str) -> int:
 
 
 def test_the_map_shows_trail_heading_and_scale() -> None:
-    assert "grid 1 m" in text(GOOD)
+    assert "grid 0.5 m" in text(GOOD, (120, 40))
+    assert "x -1.28 y -0.84 -50 deg" in text(GOOD), "80 columns have no room for more"
     assert dots(GOOD, "good") > 50
     assert dots(replace(GOOD, trail=[]), "good") == 0
     assert dots(GOOD, "driving") > 10
@@ -330,7 +331,16 @@ def test_the_scale_of_the_map_grows_in_steps() -> None:
             if " grid " in line
         )
         message.append(line.split(" grid ")[1])
-    assert message == ["0.5 m", "0.5 m", "2 m", "5 m", "20 m", "500 m", "50000 m"]
+    assert message == ["0.2 m", "0.5 m", "2 m", "5 m", "20 m", "500 m", "50000 m"]
+
+
+def test_a_wide_map_shows_what_lidars_see() -> None:
+    def seen(size: tuple[int, int]) -> str:
+        walls = [(0.1 * step, 4.0) for step in range(40)]
+        return cells(render(replace(GOOD, pose=None, trail=[], seen=walls), *size), "good")
+
+    assert any(letter > "\u2800" for letter in seen((120, 40)))
+    assert not any(letter > "\u2800" for letter in seen((80, 24))), "it would leave no room"
 
 
 def test_impossible_places_are_not_on_the_map() -> None:
