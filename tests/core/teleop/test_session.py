@@ -368,7 +368,8 @@ def test_what_its_lidar_sees_is_shown_where_it_is(
         return bool(state().seen)
 
     wait_for(sees)
-    assert list(state().seen) == pytest.approx([(4.0, 2.0)])
+    (point,) = state().seen
+    assert point == pytest.approx((4.0, 2.0))
 
 
 def test_a_paused_sim_is_shown_until_it_goes_on_or_says_no_more(
