@@ -68,7 +68,7 @@ def arrow() -> Parts:
 
 
 def _parts(shape: Shape, meshes: tuple[Mesh, ...], pictures: tuple[Texture, ...]) -> Iterator[Part]:
-    is_drawn_as_mesh = shape.kind == "mesh" or any(mesh.picture >= 0 for mesh in meshes)
+    is_drawn_as_mesh = shape.kind == "mesh" or any(mesh.picture is not None for mesh in meshes)
     if not is_drawn_as_mesh:
         yield _part(_solid(shape), shape.color or PLAIN)
     scale = shape.size if shape.kind == "mesh" else (1.0, 1.0, 1.0)
@@ -78,9 +78,8 @@ def _parts(shape: Shape, meshes: tuple[Mesh, ...], pictures: tuple[Texture, ...]
             if not 0 < len(faces) <= FINEST:
                 continue
             part = _part((vertices * scale, faces), shape.color or mesh.color or PLAIN)
-            if 0 <= mesh.picture < len(pictures):
-                places = mesh.on_picture()
-                glb = _with_picture(vertices * scale, faces, places, pictures[mesh.picture])
+            if picture := mesh.picture_of(pictures):
+                glb = _with_picture(vertices * scale, faces, mesh.on_picture(), picture)
                 part = part._replace(glb=glb)
             yield part
 

@@ -146,7 +146,7 @@ def _surfaces(
     for mesh in meshes:
         try:
             points, triangles = mesh.arrays()
-            picture = pictures[mesh.picture] if 0 <= mesh.picture < len(pictures) else None
+            picture = mesh.picture_of(pictures)
             on = (
                 np.frombuffer(picture.pixels, np.uint8).reshape(picture.height, picture.width, 3)
                 if picture

@@ -132,8 +132,8 @@ class Renderer:
         """
         made = list[int]()
         for mesh in meshes:
-            if 0 <= mesh.picture < len(pictures):
-                made += self._textured(shape, mesh, pictures[mesh.picture])
+            if picture := mesh.picture_of(pictures):
+                made += self._textured(shape, mesh, picture)
             elif shape.kind == "mesh":
                 made += self._body(self._visual(shape, mesh))
         return made if meshes or shape.kind == "mesh" else self._body(self._visual(shape))

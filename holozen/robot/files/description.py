@@ -3,7 +3,7 @@ read it.
 """
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -36,7 +36,7 @@ class Mesh(Struct, frozen=True):
     triangles: bytes
     color: Color | None = None
     uv: bytes = b""
-    picture: int = -1
+    picture: int | None = None
 
     def arrays(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.uint32]]:
         """Points (n, 3) in metres, before the scale of the shape, and triangles (m, 3) as indices
@@ -51,6 +51,12 @@ class Mesh(Struct, frozen=True):
                 "a mesh with an index out of range, or with points that are not finite"
             )
         return points, triangles
+
+    def picture_of(self, pictures: Sequence[Texture]) -> Texture | None:
+        """Its picture among those of the appearance; None if it has none, or not that one."""
+        if self.picture is None or not 0 <= self.picture < len(pictures):
+            return None
+        return pictures[self.picture]
 
     def on_picture(self) -> npt.NDArray[np.float32]:
         """The places (n, 2) of its points on its picture, from the lower left corner to (1, 1).
