@@ -19,12 +19,7 @@ from holozen.transport.connection import Connection
 
 PATIENCE = 60.0  # s for the other process to come up
 ROOT = Path(__file__).resolve().parents[1]
-WITHOUT_CARD = (
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-)
+WITHOUT_CARD = ("--no-sandbox", "--enable-unsafe-swiftshader")
 HOLOZEN = str(Path(sys.executable).with_name("holozen"))
 
 

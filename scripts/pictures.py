@@ -44,7 +44,7 @@ UNSEEN = (
     "worker",
 )
 """The modules of the view that no picture shows."""
-WEBGL = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+WEBGL = ("--enable-unsafe-swiftshader",)
 SETTLED = 4000  # ms for a software renderer
 SIZE = {"width": 1280, "height": 800}
 PHONE = {"is_mobile": True, "has_touch": True}

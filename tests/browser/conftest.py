@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, sync_playwright
 
 from holozen.testing import Process, Wire
 
-SOFTWARE_WEBGL = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+SOFTWARE_WEBGL = ("--enable-unsafe-swiftshader",)
 
 TOKEN = "sesame"
 

@@ -15,7 +15,15 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, Route
 
 from holozen import data, entities
-from holozen.messages import Header, Image, Odometry, Time, TriggerReply, TriggerRequest
+from holozen.messages import (
+    CommandStatus,
+    Header,
+    Image,
+    Odometry,
+    Time,
+    TriggerReply,
+    TriggerRequest,
+)
 from holozen.spawning import SpawnPose, spawn_file
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.pubsub import Latest
@@ -326,7 +334,7 @@ def test_a_lost_network_stops_the_robot_and_nothing_that_waited_in_it_moves_it(
     assert stays(odom), "the key is still held"
     page.keyboard.up("w")
     ask("stop")
-    page.get_by_text("Stopped by operator@").wait_for()
+    page.get_by_role("button", name="Release", exact=True).wait_for()
     link.stall()
     page.get_by_role("button", name="Release", exact=True).click()
     ask("release")
@@ -355,7 +363,7 @@ def test_of_two_pages_one_drives_and_each_stops_the_robot(
     assert wait_for(lambda: stands(odom)) and stays(odom), "the other page has to press again"
     other.keyboard.up("s")
     hold(page, "w", odom)
-    other.get_by_role("button", name="STOP", exact=True).click(delay=500)
+    other.get_by_role("button", name="STOP", exact=True).click(delay=1500)
     stops_near(odom, place(odom))
     page.get_by_text(
         "Stopped by this view"
@@ -364,6 +372,39 @@ def test_of_two_pages_one_drives_and_each_stops_the_robot(
     page.keyboard.up("w")
     page.get_by_role("button", name="Release", exact=True).click()
     other.get_by_role("button", name="STOP", exact=True).wait_for()
+
+
+PRESSED_TWICE = """new Promise(done => {
+    const press = () => {
+        document.getElementById("stop").dispatchEvent(new PointerEvent("pointerdown"));
+        document.getElementById("stop").click();
+    };
+    const notice = document.getElementById("notice");
+    new MutationObserver(() => {
+        if (!notice.textContent.startsWith("Stopped")) return;
+        press();
+        done();
+    }).observe(notice, {subtree: true, childList: true});
+    press();
+})"""
+"""A stop, and another one as soon as the page has shown the first."""
+
+
+def test_who_presses_stop_twice_does_not_release(
+    page: Page, town: Wire, odom: Latest[Odometry]
+) -> None:
+    status = town.bus("witness").latest("cmd_vel_status", CommandStatus)
+    hold(page, "w", odom)
+    page.evaluate(PRESSED_TWICE)
+    stops_near(odom, place(odom))
+    page.keyboard.up("w")
+    page.get_by_role("button", name="Release", exact=True).wait_for()
+    seen = status.count
+    assert status.wait(seen + 10, 10)
+    found = status.read()[0]
+    assert found is not None and found.stopped
+    page.get_by_role("button", name="Release", exact=True).click()
+    page.get_by_role("button", name="STOP", exact=True).wait_for()
 
 
 def test_a_click_into_the_scene_lets_go_and_gives_the_keys_back(

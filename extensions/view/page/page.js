@@ -13,6 +13,7 @@ const SLOW = 0.3; // s of delay from which the page says so
 const POLL = 30; // ms between two looks at the gamepads and the picture's age
 const SETTLES = 1000; // ms after a click on a box in which older states may come
 const TOO_FEW = 2; // fields of a plot's axis
+const ALARM = 1000; // ms after a stop in which the button still stops: a person in alarm presses it twice
 
 /** The speeds of the three gears: m/s and rad/s. */
 const GEARS = { slow: [0.15, 0.5], normal: [0.5, 1.0], fast: [1.0, 2.0] };
@@ -53,6 +54,8 @@ let clickFor = "";
 /** @type {{age: number, sent: number} | null} the picture that is shown: its age in s when it was sent, after a time of ours in ms */
 let shownPicture = null;
 let toldUntil = 0;
+/** @type {number | null} when the robot was first seen to be stopped, in ms; null: it is not */
+let stoppedAt = null;
 
 const worker = new Worker("/worker.js");
 /** @param {object} message to the server */
@@ -284,7 +287,7 @@ function notice(it) {
   if (it.stopped) return { text: `Stopped by ${it.stopped}, until it is released.`, bad: true };
   if (it.paused) return { text: "The sim is paused.", acts: [["Play", () => say({ type: "simulation", verb: "play" })]] };
   if (it.lost) return { text: "Odometry is lost. Driving blind: go slowly, or stop.", bad: true, acts: [["Slow", () => shift("slow")]] };
-  if (it.waiting) return { text: "The robot's beat is not heard yet, so nothing but stops is sent." };
+  if (it.waiting) return { text: "Waiting for the robot: until it is heard, only stops are sent." };
   if (byPicture && !isFresh()) {
     return { text: "The picture is too old to drive by.", bad: true, acts: [["Drive by the scene", () => driveByPicture(false)]] };
   }
@@ -377,7 +380,9 @@ function drawDeck(it) {
     $(id).style.left = `${50 - Math.max(0, part)}%`; // left is counter-clockwise, as the stick is
     $(id).style.width = `${Math.abs(part)}%`;
   }
-  const act = it.stopped ? "release" : "";
+  if (it.stopped && stoppedAt === null) setTimeout(draw, ALARM); // also if nothing more is heard
+  stoppedAt = it.stopped ? (stoppedAt ?? now()) : null;
+  const act = stoppedAt !== null && now() >= stoppedAt + ALARM ? "release" : "";
   if ($("stop").className !== act || !$("stop").dataset.drawn) {
     $("stop").dataset.drawn = "1";
     $("stop").className = act;
