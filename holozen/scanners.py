@@ -10,6 +10,9 @@ from holozen.plotting import Point
 from holozen.transport.graph import Endpoint
 from holozen.wire import key_for
 
+MOST = 32  # lidars; anyone may announce more
+MOST_RAYS = 1000  # of a scan; of more, every second or third is taken
+
 
 class Scanners:
     """The lidars that the graph shows: of one `robot`, by its name, "" being that at the root; or
@@ -32,7 +35,7 @@ class Scanners:
         for new in keys - self._scanners.keys():
             owners = [start for start in robots if new.startswith(start)]
             owner = max(owners, key=len).removesuffix("/") if owners else None
-            if owner is not None and self._robot in (None, owner):
+            if owner is not None and self._robot in (None, owner) and len(self._scanners) < MOST:
                 self._scanners[new] = Scanner(self._bus, new, owner)
 
     def take(self) -> None:
@@ -67,7 +70,9 @@ class Scanner:
             if (at := self._frames.of(scan.header.frame_id, self._frames.root)) is None:
                 return
             self.points = []
-            for index, far in enumerate(scan.ranges):
+            stride = max(1, math.ceil(len(scan.ranges) / MOST_RAYS))
+            for index in range(0, len(scan.ranges), stride):
+                far = scan.ranges[index]
                 if scan.range_min <= far <= scan.range_max:
                     angle = scan.angle_min + index * scan.angle_increment
                     self.points.append(
