@@ -212,7 +212,8 @@ class Reader:
 
     def press(self, name: str, verb: str, keys: str) -> None:
         terminal = self.terminals[name]
-        if verb == "hold":
+        if verb == "hold":  # a teleop that was held up disregards a key at first
+            terminal.hold_until(keys, lambda: "you drive" in terminal.screen())
             terminal.hold(keys, 1.0)
         else:
             terminal.type(keys)
