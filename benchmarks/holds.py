@@ -7,14 +7,13 @@ or stands before the release. The scenes are not drawn, as without a graphics ca
 load.
 """
 
-import shutil
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
-from benchmarks.company import beside, page_address
+from benchmarks.company import beside, chromium, page_address
 from benchmarks.report import parser, show, write
 from holozen.messages import Odometry
 from holozen.testing import Wire, wait_for
@@ -72,9 +71,7 @@ def drivers(count: int) -> Iterator[list[Driver]]:
         assert spawned.returncode == 0, spawned.stderr
         view, bus = wire.start("view", "--port", "0"), wire.bus("witness")
         view.wait_for_line("http://")
-        browser = playwright.chromium.launch(
-            executable_path=shutil.which("chromium"), args=["--no-sandbox"]
-        )
+        browser = chromium(playwright)
         found = []
         for number in range(count):
             # a page of its own has the keys, as in a window of its own
@@ -111,9 +108,13 @@ def hold(pages: list[Driver], key: str, seconds: float) -> list[str]:
 
 def main() -> int:
     flags = parser("holds", __doc__)
-    flags.add_argument("--loads", type=int, nargs="+", default=LOADS, metavar="N", help="(1 4 8)")
-    flags.add_argument("--holds", type=int, default=100, metavar="N", help="at each load (100)")
-    flags.add_argument("--pages", type=int, default=1, metavar="N", help="at a time (1)")
+    flags.add_argument(
+        "--loads", type=int, nargs="+", default=LOADS, metavar="N", help="(default: 1 4 8)"
+    )
+    flags.add_argument(
+        "--holds", type=int, default=100, metavar="N", help="at each load (default: 100)"
+    )
+    flags.add_argument("--pages", type=int, default=1, metavar="N", help="at a time (default: 1)")
     args = flags.parse_args()
     holds, seconds = (args.pages, 1.0) if args.quick else (args.holds, 10.0)
     rows: list[tuple[str, ...]] = [("load", "holds", "lost")]
