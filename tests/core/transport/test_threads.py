@@ -112,9 +112,13 @@ def test_a_bus_that_is_closed_at_once_leaves_no_link(wire: Wire) -> None:
     buses = [wire.bus(name) for name in ("first", "second", "third", "fourth")]
     wait_for(lambda: len(buses[-1].session.info.peers_zid()) == 3)
     run = [sys.executable, "-c", SHORT_LIVES, wire.endpoint]
-    done = subprocess.run(run, capture_output=True, text=True, check=True, timeout=120)
-    # 20 to 24 where a session is closed at once; a busy machine may need longer than it is given
-    assert max(map(int, done.stdout.split())) <= 10, done
+
+    def leaves_none() -> bool:
+        done = subprocess.run(run, capture_output=True, text=True, check=True, timeout=120)
+        return max(map(int, done.stdout.split())) <= 3
+
+    # each time 20 to 24 without the time to settle, which is too short now and then if all is busy
+    wait_for(leaves_none, what="lives that leave no link")
 
 
 def test_a_verb_does_not_show_what_zenoh_prints_as_it_closes(
