@@ -7,7 +7,7 @@ from holozen.bus import Bus
 from holozen.frames import RobotFrames
 from holozen.messages import LaserScan
 from holozen.plotting import Point
-from holozen.transport.graph import Endpoint
+from holozen.transport.graph import Endpoint, Graph
 from holozen.wire import key_for
 
 MOST = 32  # lidars; anyone may announce more
@@ -22,11 +22,18 @@ class Scanners:
     def __init__(self, bus: Bus, robot: str | None = None) -> None:
         self._bus, self._robot = bus, robot
         self._scanners: dict[str, Scanner] = {}  # by key
+        self._looked: int | None = None  # at the graph, by its `seen`
 
-    def follow(self, ends: Iterable[Endpoint]) -> None:
-        """Listen to the lidars among the endpoints of the graph, and no longer to those that are
-        gone.
-        """
+    def update(self, graph: Graph) -> None:
+        """Listen to the lidars that are in the graph now, and take in the scans that wait."""
+        ends = graph.endpoints()
+        if graph.seen != self._looked:
+            self._looked = graph.seen
+            self._follow(ends)
+        for scanner in self._scanners.values():
+            scanner.take()
+
+    def _follow(self, ends: Iterable[Endpoint]) -> None:
         published = [end for end in ends if end.kind == "pub"]
         robots = {end.key.removesuffix("odom") for end in published if end.key.endswith("odom")}
         keys = {end.key for end in published if end.type == LaserScan.ROS and "*" not in end.key}
@@ -37,11 +44,6 @@ class Scanners:
             owner = max(owners, key=len).removesuffix("/") if owners else None
             if owner is not None and self._robot in (None, owner) and len(self._scanners) < MOST:
                 self._scanners[new] = Scanner(self._bus, new, owner)
-
-    def take(self) -> None:
-        """Take in the scans that wait."""
-        for scanner in self._scanners.values():
-            scanner.take()
 
     @property
     def points(self) -> list[Point]:

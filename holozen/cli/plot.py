@@ -143,7 +143,6 @@ class Watcher:
 
         self.poses: dict[str, tuple[float, float, float]] = {}  # x, y, yaw by a robot's name
         self.goals: list[Point] = []
-        self._looked: int | None = None  # at the graph for lidars, by its `seen`
         self.objects: dict[str, Point] = {}
         self._graph, self._scanners = bus.graph(), Scanners(bus)
         self._ends = self._graph.settled(bus.connected)
@@ -158,10 +157,7 @@ class Watcher:
     def take(self) -> None:
         """Take in the odometry and scans that wait."""
         self._ends = self._graph.endpoints()
-        if self._looked != self._graph.seen:
-            self._looked = self._graph.seen
-            self._scanners.follow(self._ends)
-        self._scanners.take()
+        self._scanners.update(self._graph)
         while (received := self._odom.try_recv()) is not None:
             if received.message is not None:
                 name = received.key.removesuffix("odom").removesuffix("/")

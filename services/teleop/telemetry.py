@@ -82,7 +82,6 @@ class Telemetry:
         self._session = session
         self._track, self._refusals, self._tracked = Track(), Refusals(), session.client
         self._scanners = Scanners(session.bus, session.client.robot)
-        self._looked: int | None = None  # at the graph for lidars, by its `seen`
 
     def state(self, why: str, now: float, ascii: bool) -> State:
         """The state to show. `why` is the reason for the mode."""
@@ -90,7 +89,7 @@ class Telemetry:
         if client is not self._tracked:
             self._track, self._refusals, self._tracked = Track(), Refusals(), client
             self._scanners.close()
-            self._scanners, self._looked = Scanners(session.bus, client.robot), None
+            self._scanners = Scanners(session.bus, client.robot)
         odom, age = client.odom.read()
         if odom is not None:
             self._track.see(odom, now)
@@ -99,11 +98,7 @@ class Telemetry:
         settings, layout = session.mapper.settings, session.mapper.layout
         if not client.strafes:
             layout = layout.without_strafing
-        ends = session.graph.endpoints()
-        if session.graph.seen != self._looked:
-            self._looked = session.graph.seen
-            self._scanners.follow(ends)
-        self._scanners.take()
+        self._scanners.update(session.graph)
         return State(
             robot=client.robot,
             name=client.name or client.robot,

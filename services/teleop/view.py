@@ -558,9 +558,7 @@ def _cut(line: Line, columns: int) -> Line:
     return kept
 
 
-FAR_SIGHT = (
-    50  # columns of the map from which on it shows what lidars see, and so less of the track
-)
+FAR_SIGHT = 50  # columns of a map that shows what lidars see, which leaves the track less room
 PLACES = {"sign": "driving", "trail": "good", "grid": "dim", "": ""}
 """The styles of the map's parts while odom is current."""
 
@@ -588,16 +586,16 @@ def chart(state: State, columns: int, rows: int) -> list[Line]:
 def _chart_caption(pose: tuple[float, float, float] | None, scale: str, columns: int) -> Line:
     """The pose and the scale; where there is no room for both, the pose."""
     if pose is None:
-        place = ""
-        poses = ["no pose yet", place]
+        beside, alone = ["no pose yet", ""], []
     else:
         place = f"x {short(pose[0])} y {short(pose[1])}"
         turned = f" {math.degrees(math.remainder(pose[2], math.tau)):+.0f} deg"
-        poses = [f"x {number(pose[0])} y {number(pose[1])} {turned}", place + turned]
-    for text in poses:
+        beside = [f"x {number(pose[0])} y {number(pose[1])} {turned}", place + turned]
+        alone = [*beside, place]
+    for text in beside:
         if len(text) + 2 + len(scale) <= columns:
             return [("", text), ("dim", scale.rjust(columns - len(text)))]
-    for text in (*poses, place):
+    for text in alone:
         if len(text) <= columns:
             return [("", text)]
     return [("dim", scale[:columns].rjust(columns))]
