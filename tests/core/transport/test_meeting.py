@@ -60,22 +60,25 @@ def test_one_process_at_a_time_joins_and_one_that_hangs_in_it_holds_up_no_other_
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     passed = 0.0
-    clock = SimpleNamespace(monotonic=lambda: passed, sleep=time.sleep)
+    tried = threading.Event()
+
+    def sleep(seconds: float) -> None:
+        tried.set()
+        time.sleep(seconds)
+
+    clock = SimpleNamespace(monotonic=lambda: passed, sleep=sleep)
     monkeypatch.setattr(meeting, "time", clock)
     where = Connection(connect=(free_endpoint(),))._replace(listen=())
     where = where._replace(listen=where.connect)
     with meeting.turn(where):
-        waiting = threading.Event()
 
         def join() -> None:
-            waiting.set()
             with meeting.turn(where):
                 pass
 
         other = threading.Thread(target=join)
         other.start()
-        waiting.wait()
-        other.join(0.01)
+        assert tried.wait(30)
         assert other.is_alive()
         passed = meeting.TURN
         other.join(30)
