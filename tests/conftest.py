@@ -13,6 +13,7 @@ HOLOZEN_LONG=1:
         for _ in range(trials(3, 20)):
 """
 
+import gc
 import os
 import shutil
 import signal
@@ -102,6 +103,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         return order[item.path], shares
 
     items.sort(key=place)
+
+
+def pytest_collection_finish() -> None:
+    # What thousands of collected tests are made of stays: no garbage collection looks at it again.
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True, scope="session")

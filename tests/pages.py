@@ -26,7 +26,7 @@ import shlex
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -51,7 +51,7 @@ EDIT = re.compile(r"(?P<file>[^,]+)(?:, (?P<how>before|after|instead of) (?P<whe
 READ = {"py", "text", "toml", "xml"}  # blocks that are only read
 WITHIN = 60.0  # s for a command
 MOMENT = 5.0  # s for the first line of one that goes on; it may have nothing to say
-OF_A_SIM = "listens on"  # after lines that it prints before anyone can find it
+OF_A_SIM = "listens on", "no robot yet"  # after lines that it prints before anyone can find it
 MORE = 0.5  # s that it has to go on after that, since the line may be an error
 
 
@@ -138,7 +138,7 @@ class Reader:
         """Run a command a line; those that go on are `started`, and have begun before one that ends
         is run.
         """
-        begun = list[tuple[Terminal, str, float]]()
+        begun = list[tuple[Terminal, Sequence[str], float]]()
         for text in [*lines, ""]:
             line = text.partition("  #")[0].strip()
             if line.startswith("export "):
@@ -148,7 +148,7 @@ class Reader:
             goes_on = GOES_ON.match(line)
             if goes_on:
                 started.append(self.open(line.removesuffix(" &")))
-                said = OF_A_SIM if "holozen sim" in line else ""
+                said = OF_A_SIM if "holozen sim" in line else ("",)
                 moment = WITHIN if said else MOMENT
                 begun.append((started[-1], said, time.monotonic() + moment))
             while begun and (" record " in line or not goes_on):
@@ -227,13 +227,13 @@ def end(terminals: list[Terminal]) -> None:
         terminal.close()
 
 
-def speaks(terminal: Terminal, said: str, until: float) -> bool:
-    """Whether a terminal shows what is to be `said`, or anything if that is empty, or has been
-    waited for. AssertionError if its command ended.
+def speaks(terminal: Terminal, said: Sequence[str], until: float) -> bool:
+    """Whether a terminal shows something that holds one of `said`, or has been waited for.
+    AssertionError if its command ended.
     """
     assert terminal.process.returncode is None, plain(terminal.raw)
     shown = plain(terminal.raw).strip()
-    return bool(shown and said in shown) or time.monotonic() > until
+    return bool(shown and any(part in shown for part in said)) or time.monotonic() > until
 
 
 def has(terminal: Terminal, shown: str) -> bool:
