@@ -50,6 +50,11 @@ def guest(endpoint: str) -> Connection:
     return Connection(connect=(endpoint,), listen=())
 
 
+def client(endpoint: str) -> Connection:
+    """The connection of a client of the router at `endpoint`."""
+    return Connection("client", connect=(endpoint,))
+
+
 @contextmanager
 def beside(job: Callable[..., None], *args: Any) -> Iterator[None]:
     """Within this block another process runs `job(*args)`, which never returns."""

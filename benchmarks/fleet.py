@@ -3,9 +3,11 @@ Hz of sim time.
 
 Another process commands each robot once a second of sim time, a third one subscribes to `*/odom`.
 Beside it, in turns, the bare engine steps the same bodies on the same ground. Time is processor
-time of all threads of the sim's process, so the real-time factor is that of one core. The last
-cases are a fleet in two processes against one: shards that are read, shards that are not, and bare
-engines, which show what the machine can give.
+time of all threads of the sim's process, so the real-time factor is that of one core. Then come
+fleets in two processes against one: shards that are read, shards that are not, and bare engines,
+which show what the machine can give. The last case is ten pilots among 300 bases on one bus, each
+with a beat of its own, against the same among ten: a sender hears the beats of those alone that it
+drives. Its third side hears them all.
 """
 
 import math
@@ -21,7 +23,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from benchmarks.company import beside, guest, host, meeting_point, until
+from benchmarks.company import beside, client, guest, host, meeting_point, until
 from benchmarks.report import Case, parser, publish
 from benchmarks.sim_loop import REST, ROBOT, WORLD, Stepper, repeated
 from holozen.bus import Bus
@@ -29,6 +31,7 @@ from holozen.messages import Clock, Twist
 from holozen.robot.files.loading import load
 from holozen.robot.model import RobotModel
 from holozen.robot.rigid import lump
+from holozen.transport.connection import Connection
 from services.sim.entities import Entities
 from services.sim.loop import Loop
 from services.sim.physics.engine import UPRIGHT
@@ -44,6 +47,8 @@ COMMAND = Twist.planar(0.2, 0.0, 0.5)
 COMMANDED = 1.0  # Hz of sim time, of each robot
 SHARDED = 300  # robots of the case with shards
 SETTLING = 120  # steps until all stand on the ground
+BASES, PILOTS = 300, 10  # on one bus; each pilot drives one base
+PILOTED = 20.0  # Hz of each pilot's commands
 
 
 def places(robots: int) -> list[tuple[float, float, float]]:
@@ -199,6 +204,56 @@ def side_by_side(job: Any, count: int, seconds: float, is_read: bool = True) -> 
     return [1e6 / sum(found)]
 
 
+def router(endpoint: str) -> None:
+    """Where bases and pilots meet."""
+    with Bus("router", Connection("router", listen=(endpoint,)), lasting=True):
+        threading.Event().wait()
+
+
+def bases(endpoint: str, count: int) -> None:
+    """Robots that obey commands, each with a session and a beat of its own."""
+    with ExitStack() as buses:
+        beats = []
+        for number in range(count):
+            bus = buses.enter_context(Bus(f"base{number}", client(endpoint), lasting=True))
+            bus.subscribe(f"bot{number}/cmd_vel", Twist, depth=1)
+            beats.append(bus.beat())
+        while True:
+            for beat in beats:
+                beat.poll()
+            time.sleep(0.01)
+
+
+def pilots(endpoint: str, seconds: float, hears_all: bool, results: Any) -> None:
+    """Command a base each. The processor time of a second, in ms, goes into `results`."""
+    with ExitStack() as buses:
+        commands = []
+        for number in range(PILOTS):
+            bus = buses.enter_context(Bus(f"pilot{number}", client(endpoint), lasting=True))
+            commands.append(bus.publisher(f"bot{number}/cmd_vel", Twist))
+            if hears_all:
+                bus.subscribe_raw("@holozen/*/beat", depth=1)
+        until(lambda: all(command.echoes and command.echoes.heard for command in commands))
+        start, begun = time.process_time(), time.monotonic()
+        while (passed := time.monotonic() - begun) < seconds:
+            for command in commands:
+                command.put(COMMAND)
+            time.sleep(1 / PILOTED)
+        results.put((time.process_time() - start) / passed * 1e3)
+        time.sleep(60)  # until it is ended
+
+
+def piloted(count: int, seconds: float, hears_all: bool = False) -> list[float]:
+    """Milliseconds of processor time a second that PILOTS take on a bus with `count` bases."""
+    results, endpoint = multiprocessing.get_context("spawn").Queue(), meeting_point()
+    with (
+        beside(router, endpoint),
+        beside(bases, endpoint, count),
+        beside(pilots, endpoint, seconds, hears_all, results),
+    ):
+        return [results.get(timeout=300)]
+
+
 def plot(fleets: list[dict[str, float]], cases: list[Case], file: Path) -> None:
     """Plot the cost of a robot and step against the number of robots, beside that of the bare
     engine.
@@ -249,6 +304,18 @@ def main() -> int:
         )
         two, one = (partial(side_by_side, job, count, seconds, is_read) for count in (2, 1))
         cases.append(case.take_turns(turns, two=two, one=one))
+    among = PILOTS + 1 if args.quick else BASES
+    beats = Case(
+        f"{PILOTS} pilots among {among} bases", "ms of processor time a second", "as among 10"
+    )
+    cases.append(
+        beats.take_turns(
+            turns,
+            among_all=partial(piloted, among, seconds),
+            among_10=partial(piloted, PILOTS, seconds),
+            hearing_all=partial(piloted, among, seconds, True),
+        )
+    )
     publish("fleet", cases, args.json, fleets=fleets)
     return 0
 

@@ -51,7 +51,9 @@ EDIT = re.compile(r"(?P<file>[^,]+)(?:, (?P<how>before|after|instead of) (?P<whe
 READ = {"py", "text", "toml", "xml"}  # blocks that are only read
 WITHIN = 60.0  # s for a command
 MOMENT = 5.0  # s for the first line of one that goes on; it may have nothing to say
-OF_A_SIM = "listens on", "no robot yet"  # after lines that it prints before anyone can find it
+OF_A_SIM: Sequence[str] = ("listens on", "no robot yet")
+"""Of the last lines of a sim's start, after which it can be found."""
+ANYTHING: Sequence[str] = ("",)
 MORE = 0.5  # s that it has to go on after that, since the line may be an error
 
 
@@ -148,8 +150,8 @@ class Reader:
             goes_on = GOES_ON.match(line)
             if goes_on:
                 started.append(self.open(line.removesuffix(" &")))
-                said = OF_A_SIM if "holozen sim" in line else ("",)
-                moment = WITHIN if said else MOMENT
+                said = OF_A_SIM if "holozen sim" in line else ANYTHING
+                moment = MOMENT if said is ANYTHING else WITHIN
                 begun.append((started[-1], said, time.monotonic() + moment))
             while begun and (" record " in line or not goes_on):
                 terminal, said, until = begun.pop(0)

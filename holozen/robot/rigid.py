@@ -230,7 +230,8 @@ def _sum(parts: list[tuple[Frame, Inertial]]) -> tuple[float, Array, Array]:
 class Part(Struct, frozen=True):
     """Links that move together, in the frame of the topmost, `link`.
 
-    `joint` moves it, None for the root's part; `parent` is the index of the part that carries it.
+    `joint` moves it, and `parent` is the index of the part that carries it; both are None for the
+    root's part.
     `xyz` in metres and the quaternion x, y, z, w `rotation` are its pose in that part's frame, with
     its joint at zero.
     """
@@ -239,7 +240,7 @@ class Part(Struct, frozen=True):
     body: Body
     surface: Surface
     joint: Joint | None = None
-    parent: int = -1
+    parent: int | None = None
     xyz: Vector = (0.0, 0.0, 0.0)
     rotation: XYZW = (0.0, 0.0, 0.0, 1.0)
 

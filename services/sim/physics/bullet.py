@@ -559,11 +559,13 @@ def _link(links: Links, shapes: Shapes, parts: Sequence[Part]) -> tuple[int, lis
     own = [shapes.of(part.body.collisions) or [NOTHING] for part in parts]
     indices = [-1]
     for part, (first, *_) in zip(parts[1:], own[1:], strict=True):
-        joint, body, parent = part.joint, part.body, indices[part.parent]
-        assert joint is not None, "only the root's part has none"
+        joint, body = part.joint, part.body
+        assert joint is not None and part.parent is not None, "only the root's part has none"
         at, inertial = (part.xyz, part.rotation), (body.centre, body.axes)
         indices.append(
-            links.add(parent, first, JOINTS[joint.kind], joint.axis, at, body.mass, inertial)
+            links.add(
+                indices[part.parent], first, JOINTS[joint.kind], joint.axis, at, body.mass, inertial
+            )
         )
     others = [
         [links.add(index, shape) for shape in more]

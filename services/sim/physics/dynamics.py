@@ -80,7 +80,7 @@ def _carrier(parts: Sequence[Part], part: Part) -> float:
     """The inertia of the part that carries this one, about this one's joint axis; its mass for a
     prismatic joint. Infinite for one without, such as a link `world`, which the engine holds.
     """
-    assert part.joint is not None, "nothing carries the root"
+    assert part.joint is not None and part.parent is not None, "nothing carries the root"
     carrier = parts[part.parent].body
     if part.joint.kind == "prismatic":
         return carrier.mass or math.inf

@@ -121,7 +121,7 @@ class MuJoCo(Engine):
         made: list[mj.MjsBody] = []
         motors = []
         for index, (part, contact) in enumerate(zip(parts, contacts, strict=True)):
-            if part.joint is None:
+            if part.parent is None:
                 body = self._spec.worldbody.add_body(pos=at, quat=_wxyz(rotation))
                 if not static:
                     body.add_freejoint()

@@ -200,7 +200,7 @@ class PlanarBody(Body):
         self._glide: Glide | None = None
         self._commanded = STOP  # the last velocity of the drive
         self.speed = 0.0  # m/s; the greatest speed of any of its points since its last look
-        self.check_at = -1  # the step at which it checks for neighbours next
+        self.check_at = field.steps  # the step at which it checks for neighbours next
         self._stood: tuple[float, ...] = ()  # height and upward axis at the last look
         self._held: tuple[float, float] | None = None  # the place to hold
         # the velocity of the centre that was set for the last step
