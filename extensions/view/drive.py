@@ -32,6 +32,7 @@ T = TypeVar("T")
 
 TICK = 0.02  # s
 REPEAT = 0.05  # s after which a stop is repeated
+PATIENCE = 2.0  # s to hear a controller before the first goal
 NEAR = 0.2  # m, and in a quaternion; nearer odometry is taken for the true pose, at another moment
 # m/s and rad/s; the least and the most that a page may choose
 SPEEDS, TURNS = ((0.05, 2.0), (0.1, 3.0))
@@ -182,7 +183,10 @@ class Driver:
 
     @cached_property
     def _goals(self) -> Publisher[PoseStamped]:
-        return self._bus.publisher(key_for("goal_pose", self.namespace), PoseStamped)
+        goals = self._bus.publisher(key_for("goal_pose", self.namespace), PoseStamped)
+        if goals.echoes:
+            goals.echoes.settle(PATIENCE)  # a click waits in a thread of its own
+        return goals
 
     def send_to(self, x: float, y: float, true_pose: Pose) -> str:
         """Send its controller to a point of the world (m); the robot keeps its heading. Returns a
@@ -194,6 +198,8 @@ class Driver:
         if not self._goals.matched:
             command = " ".join(filter(None, ("holozen controller", self.namespace, "--laps 0")))
             return f"it has no controller; `{command}` starts one"
+        if self._goals.echoes and not self._goals.echoes.may_command():
+            return "its controller was not heard yet; try it again in a moment"
         goal = in_odometry((x, y, true_pose.position.z), true_pose, odom.pose.pose)
         frame = odom.header.frame_id
         self._goals.put(

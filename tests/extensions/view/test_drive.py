@@ -38,6 +38,22 @@ def test_stale_odometry_gives_no_velocity_and_takes_no_goal(
         assert (driver.send_to(1.0, 0.0, Pose(Point())) == "it has no odometry now") != is_current
 
 
+def test_no_goal_is_sent_to_a_controller_that_was_not_heard_yet(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(drive, "RobotFeedback", lambda *_: feedback(0.0))
+    goals = MagicMock(matched=True)
+    bus = MagicMock(publisher=lambda *_: goals)
+    bus.latest.return_value.read.return_value = (None, 0.0)
+    driver = Driver(bus, "cmd_vel", "odom")
+    goals.echoes.may_command.return_value = False
+    assert "not heard yet" in driver.send_to(1.0, 0.0, Pose(Point()))
+    goals.put.assert_not_called()
+    goals.echoes.may_command.return_value = True
+    assert driver.send_to(1.0, 0.0, Pose(Point())).startswith("goal 1.00 0.00")
+    goals.put.assert_called_once()
+
+
 def test_a_driver_goes_when_no_page_has_its_robot_and_its_pad_rests(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
