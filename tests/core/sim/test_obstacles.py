@@ -182,7 +182,7 @@ def test_without_the_tag_it_drives_into_the_wall_and_by_a_parameter_it_does_not(
     assert switch.read() == 0.0
     assert switch.write is not None
     switch.write(1.2)
-    ride.drive((1.0, 0.0, 0.0), 5.0)
+    ride.drive((1.0, 0.0, 0.0), 8.0)
     assert (ride.touched(), ride.limited) == (set(), "stopped: 0.1 m ahead")
     switch.write(0.0)
     ride.drive((1.0, 0.0, 0.0), 1.0)
