@@ -6,7 +6,9 @@ import io
 import os
 import subprocess
 import tarfile
+import tempfile
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
@@ -33,7 +35,8 @@ pytestmark = [
 def run(engine: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
     """`run(WORDS...)`: their output, in a container with a fresh clone; they have to succeed."""
     if BASE.exists():
-        subprocess.run([BASE, "3.13"], check=True, capture_output=True)
+        lock = Path(tempfile.gettempdir(), "holozen-apt")  # that of scripts/image and scripts/parts
+        subprocess.run(["flock", lock, BASE, "3.13"], check=True, capture_output=True)
     container = docker("run", "--detach", "--rm", "--init", NAME, "sleep", "infinity").strip()
     archive = io.BytesIO()
     with tarfile.open(fileobj=archive, mode="w") as tar:
