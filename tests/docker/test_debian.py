@@ -6,9 +6,7 @@ import io
 import os
 import subprocess
 import tarfile
-import tempfile
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 
@@ -35,8 +33,7 @@ pytestmark = [
 def run(engine: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
     """`run(WORDS...)`: their output, in a container with a fresh clone; they have to succeed."""
     if BASE.exists():
-        lock = Path(tempfile.gettempdir(), "holozen-apt")  # that of scripts/image and scripts/parts
-        subprocess.run(["flock", lock, BASE, "3.13"], check=True, capture_output=True)
+        subprocess.run([BASE, "3.13"], check=True, capture_output=True)
     container = docker("run", "--detach", "--rm", "--init", NAME, "sleep", "infinity").strip()
     archive = io.BytesIO()
     with tarfile.open(fileobj=archive, mode="w") as tar:
