@@ -7,6 +7,7 @@ import os
 import subprocess
 import tarfile
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
@@ -34,7 +35,11 @@ def run(engine: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]
     """`run(WORDS...)`: their output, in a container with a fresh clone; they have to succeed."""
     if BASE.exists():
         subprocess.run([BASE, "3.13"], check=True, capture_output=True)
-    container = docker("run", "--detach", "--rm", "--init", NAME, "sleep", "infinity").strip()
+    # File systems of the kernel: an overlay in user space may list a new file late.
+    disks = ("--volume", str(Path(TREE).parent), "--tmpfs", "/tmp:exec")
+    container = docker(
+        "run", "--detach", "--rm", "--init", *disks, NAME, "sleep", "infinity"
+    ).strip()
     archive = io.BytesIO()
     with tarfile.open(fileobj=archive, mode="w") as tar:
         tar.add(clone(tmp_path_factory.mktemp("clone")), arcname=TREE)
@@ -47,7 +52,7 @@ def run(engine: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]
         return done.stdout
 
     yield run
-    docker("rm", "--force", container)
+    docker("rm", "--force", "--volumes", container)
 
 
 def test_the_first_minutes_in_debian_13(run: Run) -> None:
