@@ -186,15 +186,17 @@ def one_engine(_endpoint: str, share: Share, together: Any, results: Any) -> Non
     counted(bare(load(ROBOT), share[0]), share, together, results)
 
 
-def side_by_side(job: Any, count: int, seconds: float, is_read: bool = True) -> list[float]:
-    """Microseconds of real time a robot and step, of a fleet in `count` processes at once, whose
-    odometry `is_read`.
+def side_by_side(
+    job: Any, count: int, sharded: int, seconds: float, is_read: bool = True
+) -> list[float]:
+    """Microseconds of real time a robot and step, of `sharded` robots in `count` processes at once,
+    whose odometry `is_read`.
     """
     spawn, endpoint = multiprocessing.get_context("spawn"), meeting_point()
     results, together = spawn.Queue(), spawn.Barrier(count)
     with ExitStack() as sims, Bus("watcher", host(endpoint)) as bus:
         odoms = bus.subscribe_raw("*/odom", depth=1) if is_read else None
-        robots = SHARDED // count
+        robots = sharded // count
         for number in range(count):
             share = robots, number * robots, seconds
             sims.enter_context(beside(job, endpoint, share, together, results))
@@ -294,15 +296,18 @@ def main() -> int:
         plot(fleets, cases, args.plot)
     seconds = 0.2 if args.quick else 3.0
     turns = 1 if args.quick else 5
+    sharded = 2 if args.quick else SHARDED
     for name, job, is_read in (
-        (f"{SHARDED} robots in sims", one_shard, True),
+        (f"{sharded} robots in sims", one_shard, True),
         ("the same, unread", one_shard, False),
         ("the same in bare engines", one_engine, False),
     ):
         case = Case(
             name, "us of real time a robot and step", "ratio of two processes to one <= 0.6"
         )
-        two, one = (partial(side_by_side, job, count, seconds, is_read) for count in (2, 1))
+        two, one = (
+            partial(side_by_side, job, count, sharded, seconds, is_read) for count in (2, 1)
+        )
         cases.append(case.take_turns(turns, two=two, one=one))
     among = PILOTS + 1 if args.quick else BASES
     beats = Case(

@@ -19,7 +19,7 @@ from tests.present import VERBS
 ROOT = Path(__file__).resolve().parents[2]
 LONG = os.environ.get("HOLOZEN_LONG") == "1"
 IN_PAGE = ("in the page, to motion", "in the page, to rest")
-FLAGS = {"sim_loop": ["--profile"]}
+FLAGS = {"sim_loop": ["--profile"], "fleet": ["--robots", "2"]}
 CASES = {
     "cli": {
         "first line, odom at 500 Hz": ["holozen", "raw zenoh", "python alone", "ratio"],
@@ -40,6 +40,13 @@ CASES = {
     "startup": {
         "first line, odom at 50 Hz": ["holozen", "raw zenoh", "python alone", "ratio"],
         "up to first odom": ["holozen"],
+    },
+    "fleet": {
+        "2 robots": ["holozen", "bare engine", "ratio"],
+        "2 robots in sims": ["two", "one", "ratio"],
+        "the same, unread": ["two", "one", "ratio"],
+        "the same in bare engines": ["two", "one", "ratio"],
+        "10 pilots among 11 bases": ["among all", "among 10", "hearing all", "ratio"],
     },
     "concave": {"driving in a house": ["one mesh", "boxes", "no house", "ratio"]},
     "record": {"50 topics at 100 Hz, sent to taken in": ["holozen"]},
@@ -64,7 +71,7 @@ if LONG and shutil.which("chromium"):  # which takes as long to start as all oth
 else:
     FLAGS["key_to_motion"] = ["--terminal"]
 if not find_spec("pybullet"):
-    del CASES["sim_loop"]  # it is measured beside that engine
+    del CASES["sim_loop"], CASES["fleet"]  # they are measured beside that engine
 
 
 def run(name: str, *words: str) -> str:
