@@ -50,6 +50,20 @@ LISTED = (ROUTER, "sim", "autopilot")
 AUTHORITY_DAYS = 3650
 HERE = ("localhost", "127.0.0.1", "::1")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
+SIGNS_CERTIFICATES = x509.KeyUsage(
+    digital_signature=False,
+    content_commitment=False,
+    key_encipherment=False,
+    data_encipherment=False,
+    key_agreement=False,
+    key_cert_sign=True,
+    crl_sign=True,
+    encipher_only=False,
+    decipher_only=False,
+)
+"""The use of the authority's key. It and the identifiers of keys are in the profile of RFC 5280,
+sections 4.2.1.1 to 4.2.1.3, on which strict readers, such as Python 3.13, insist.
+"""
 
 
 class AuthorityError(Failure):
@@ -69,6 +83,7 @@ def initialize(root: Path, hosts: Sequence[str], days: float) -> None:
     key = Ed25519PrivateKey.generate()
     builder = _builder(_name("holozen authority"), key.public_key(), AUTHORITY_DAYS)
     builder = builder.add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+    builder = builder.add_extension(SIGNS_CERTIFICATES, critical=True)
     _write_key(root / AUTHORITY_KEY, key)
     _write(
         root / AUTHORITY,
@@ -204,6 +219,8 @@ def _issue(
         x509.BasicConstraints(ca=False, path_length=None), critical=True
     )
     builder = builder.add_extension(x509.ExtendedKeyUsage([use]), critical=True)
+    issuer = x509.AuthorityKeyIdentifier.from_issuer_public_key(signer.public_key())
+    builder = builder.add_extension(issuer, critical=False)
     names = hosts or [x509.DNSName(name)]
     return builder.add_extension(x509.SubjectAlternativeName(names), critical=False).sign(
         signer, None
@@ -218,6 +235,8 @@ def _builder(
     builder = (
         x509.CertificateBuilder().subject_name(subject).public_key(key).not_valid_before(begin)
     )
+    own = x509.SubjectKeyIdentifier.from_public_key(key)
+    builder = builder.add_extension(own, critical=False)
     return builder.serial_number(x509.random_serial_number()).not_valid_after(
         now + datetime.timedelta(days=days)
     )

@@ -134,6 +134,7 @@ def test_pytest_loads_nothing_heavy_without_the_fixtures(shown: str) -> None:
     assert "_ test_first _" not in shown, "which is the one that looks"
 
 
+@pytest.mark.needs("ps")
 def test_a_test_that_fails_shows_what_its_processes_wrote_and_leaves_none(shown: str) -> None:
     _, _, of_it = shown.partition("_ test_that_fails _")
     of_it, _, _ = of_it.partition("_ test_0 _")
