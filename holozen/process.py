@@ -146,9 +146,10 @@ class Ending:
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
-    """Discard what code that is not Python's prints to stderr, and all else that is printed
-    there.
+    """Discard what code that is not Python's prints to stderr, and all else that is printed there.
+    What was reported before is written first: its thread may not have run yet, on a busy machine.
     """
+    drain()
     saved, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 2)
     try:

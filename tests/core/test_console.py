@@ -95,3 +95,20 @@ def test_the_last_line_is_written_on_a_machine_that_stalls_while_it_waits() -> N
         [sys.executable, "-c", STALLS], capture_output=True, text=True, timeout=60
     )
     assert done.stderr == "the reason\n"
+
+
+LATE = """
+import _thread, time
+start = _thread.start_new_thread
+_thread.start_new_thread = lambda run, args: start(lambda: (time.sleep(0.1), run(*args)), ())
+from holozen.console import report
+from holozen.process import quiet
+report("said before")
+with quiet():
+    time.sleep(0.3)
+"""
+
+
+def test_what_is_said_before_a_silence_is_written_though_its_thread_runs_late() -> None:
+    done = subprocess.run([sys.executable, "-c", LATE], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "said before\n")

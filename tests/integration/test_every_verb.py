@@ -207,7 +207,7 @@ def test_without_nodes_it_reports_that(files: Files) -> None:
         lines = done.stderr.splitlines()
         if name.endswith("record"):
             assert lines.pop(0).startswith("recording odom into ")
-        assert (done.returncode, len(lines)) == (code, 1), f"{name}: {done.stderr}"
+        assert (done.returncode, len(lines)) == (code, 1), f"{name}: {done}"
         assert part in lines[0] and is_clean(done.stderr), f"{name}: {done.stderr}"
 
 
