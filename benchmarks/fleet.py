@@ -208,7 +208,7 @@ def side_by_side(
 
 def router(endpoint: str) -> None:
     """Where bases and pilots meet."""
-    with Bus("router", Connection("router", listen=(endpoint,)), lasting=True):
+    with Bus("router", Connection("router", connect=(), listen=(endpoint,)), lasting=True):
         threading.Event().wait()
 
 
