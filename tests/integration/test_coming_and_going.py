@@ -17,7 +17,7 @@ from holozen.testing import Process, Wire, wait_for
 from holozen.transport.errors import BusError
 
 from .conftest import foreign_config, start_sim
-from .robots import Robot, moves, place, rests
+from .robots import Robot, moves, place
 
 
 def test_a_sim_killed_while_driving_and_started_again_stands_until_a_key_is_pressed_again(
@@ -35,8 +35,7 @@ def test_a_sim_killed_while_driving_and_started_again_stands_until_a_key_is_pres
     terminal.wait_for_text("odom was lost: stopped")
     start_sim(wire)
     wait_for(lambda: "ODOM IS STALE" not in terminal.screen())
-    newest = robot.newest()
-    assert rests(newest) and place(newest) == pytest.approx((0, 0, 0), abs=1e-3)
+    assert place(robot.stands()) == pytest.approx((0, 0, 0), abs=1e-3)
     terminal.hold_until("J", lambda: moves(robot.newest(), 0, 0.5, 0))
     terminal.type("k")
     robot.stands()
