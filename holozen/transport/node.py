@@ -442,10 +442,7 @@ class Node:
         """
         if self.session.info.routers_zid():  # it sees everything through the router
             return []
-        peers, count = [*map(str, self.session.info.peers_zid())], self._opened().others.count()
-        if count is not None and count <= len(peers):
-            return []
-        linked = " ".join([self.id, *peers])
+        linked = " ".join([self.id, *map(str, self.session.info.peers_zid())])
         found: set[graphs.Endpoint] = set()
         for reply in self.ask_all(graphs.ALL_WITNESSES, max(WITNESSES, self.took), payload=linked):
             if not isinstance(reply, bytes):

@@ -3,10 +3,12 @@ obeyed.
 """
 
 import signal
+import sys
 import time
 
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
+from tests.faults.namespaces import NEEDS, Lab
 
 from .conftest import Verb, comes_to
 from .processes import stopped
@@ -18,6 +20,18 @@ BOTH = ["Bob", "Fred"]
 FREES = [("list",), ("doctor",), ("release",), ("sim", "play")]
 HOLDS = [("stop",), ("sim", "pause"), ("sim", "reset")]
 """Apart: what frees is refused where it may have been sent before what holds."""
+FOREIGN = """
+import threading, zenoh
+config = zenoh.Config()
+config.insert_json5("scouting/multicast/enabled", "false")
+config.insert_json5("connect/endpoints", '["tcp/127.0.0.1:7447"]')
+with zenoh.open(config) as session:
+    while not session.info.peers_zid():
+        pass
+    print("linked", flush=True)
+    threading.Event().wait()
+"""
+"""A peer that has no multicast: the processes on loopback cannot count it."""
 
 
 def two_sims(wire: Wire) -> Process:
@@ -90,3 +104,18 @@ def test_a_client_of_one_sim_reaches_the_other_through_it(wire: Wire) -> None:
     with Process(command("stop", "--mode", "client", "--connect", wire.endpoint)) as stop:
         assert stop.wait() == 0, stop.err
         assert stopped(stop.out) == BOTH
+
+
+@NEEDS
+def test_a_peer_without_multicast_hides_none_that_hangs() -> None:
+    with Lab() as lab:
+        machine = lab.host("machine")
+        for name in BOTH:
+            hung = machine.start(*command("sim", "--join", "--robot", f"{BOT}={name}"))
+            hung.wait_for_line(f"{name} listens on")
+        machine.start(sys.executable, "-c", FOREIGN).wait_for_line("linked")
+        comes_to(BOTH, lambda: stopped(machine.run(*command("stop")).stdout))
+        hung.signal(signal.SIGSTOP)
+        stop = machine.start(*command("stop"))
+        assert stop.wait() == 1
+        assert "Fred did not confirm" in stop.err
