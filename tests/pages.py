@@ -241,7 +241,8 @@ def speaks(terminal: Terminal, said: Sequence[str], until: float) -> bool:
 def has(terminal: Terminal, shown: str) -> bool:
     """Whether a terminal shows it. AssertionError if its command ended without."""
     ended = terminal.process.returncode is not None
-    found = same(shown, terminal.raw)
+    # What fills the screen writes only what has changed; what scrolls is no longer there.
+    found = same(shown, terminal.screen()) or same(shown, terminal.raw)
     assert found or not ended, f"{plain(terminal.raw)}\ninstead of\n{shown}"
     return found
 
