@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 D = TypeVar("D", bound=Declared)
 
 ROLL_CALL = 2.0  # s for all nodes to send their tokens; a sim with hundreds of robots has thousands
-WITNESSES = 1.0  # s for others to tell of robots and sims that hang
+WITNESS_TIMEOUTS = (1.0, 5.0)  # s for all others to tell of what hangs; if none does, for any
 DEFINITION_WAIT = 0.5  # s for a node to be found that answers
 DEFINITION_TIMEOUT = 2.0  # s for its answer
 LAST_WAIT = 0.5  # s for a publisher to be found that answers with its last message
@@ -442,19 +442,27 @@ class Node:
         """
         if self.session.info.routers_zid():  # it sees everything through the router
             return []
-        linked = " ".join([self.id, *map(str, self.session.info.peers_zid())])
-        found: set[graphs.Endpoint] = set()
-        for reply in self.ask_all(graphs.ALL_WITNESSES, max(WITNESSES, self.took), payload=linked):
-            if not isinstance(reply, bytes):
-                keys = reply.payload.decode(errors="replace").splitlines()
-                found.update(
-                    end for key in keys if (end := graphs.parse(key)) and end.kind == "srv"
-                )
+        keys = [key for answer in self._witnesses() for key in answer.splitlines()]
+        found = {end for key in keys if (end := graphs.parse(key)) and end.kind == "srv"}
         if not found:
             return []
         # A client of a peer sees others through it, without a link.
         seen = {end.session for keys in graphs.WITNESSED for end in self.endpoints(keys)}
         return sorted(end for end in found if end.session not in seen)
+
+    def _witnesses(self) -> list[str]:
+        """What other sessions know of those to which this one has no link: tokens, one a line."""
+        linked = " ".join([self.id, *map(str, self.session.info.peers_zid())])
+        for timeout in WITNESS_TIMEOUTS:
+            replies = self.ask_all(graphs.ALL_WITNESSES, max(timeout, self.took), payload=linked)
+            answers = [
+                reply.payload.decode(errors="replace")
+                for reply in replies
+                if not isinstance(reply, bytes)
+            ]
+            if answers:
+                return answers
+        return []
 
     def silent(self) -> str:
         """Which processes are there on this machine and do not answer, and what to do; empty if

@@ -84,7 +84,10 @@ def test_the_tests_pass_in_debian_13(run: Run) -> None:
         run("bash", "-c", PARTS)
         run("bash", "-c", "git init -q && git add -A")
         paths = ["tests", "--ignore=tests/docker"]
-    words = ("-q", "-p", "no:cacheprovider", "-n", "2", "--dist=loadfile", "--no-loadscope-reorder")
-    run(".venv/bin/python", "-m", "pytest", *words, "-m", "not alone", *paths)
+    words = ("-q", "-p", "no:cacheprovider", "--dist=loadfile", "--no-loadscope-reorder")
+    cores = os.cpu_count() or 2
+    many = f"--numprocesses={5 * cores // 2}"  # as scripts/test
+    run(".venv/bin/python", "-m", "pytest", *words, many, "-m", "not alone", *paths)
     if LONG:
-        run(".venv/bin/python", "-m", "pytest", *words, "-m", "alone", *paths)
+        few = f"--numprocesses={cores}"
+        run(".venv/bin/python", "-m", "pytest", *words, few, "-m", "alone", *paths)
