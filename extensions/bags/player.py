@@ -24,6 +24,7 @@ from holozen.transport.pubsub import RawPublisher
 
 STOPS, STOP_EVERY = 5, 0.02  # s; several stops, since a congested link may drop some
 SETTLE = 0.3  # s for subscribers to match, so that they receive the first messages
+BEAT_WAIT = 2.0  # s for a robot's first beat; the commands before it would be lost
 LOOK = 0.05  # s between two polls of the keyboard and of `stop`
 GAP = 0.5  # s between two looks; after more the process was suspended
 ANY = "any/msg/Any"  # the type of a channel that has none
@@ -172,15 +173,18 @@ class Outlet:
         }
 
     def settle(self) -> None:
-        """Wait briefly for subscribers, and for the beats of the robots that commands are for."""
+        """Wait briefly for subscribers, then for the beats of the robots that commands are for: on
+        a busy machine their links may still be being made.
+        """
+        deadline = time.monotonic() + SETTLE
+        while time.monotonic() < deadline and not self._is_matched():
+            time.sleep(0.005)
         for route in self._routes.values():
             if route.publisher.echoes:
-                route.publisher.echoes.settle()
-        deadline = time.monotonic() + SETTLE
-        while time.monotonic() < deadline:
-            if any(route.publisher.matched for route in self._routes.values()):
-                return
-            time.sleep(0.005)
+                route.publisher.echoes.settle(BEAT_WAIT)
+
+    def _is_matched(self) -> bool:
+        return any(route.publisher.matched for route in self._routes.values())
 
     def publish(self, message: Message) -> bool:
         """Send a message, if its channel is in the plan. Returns whether it was sent: a channel is

@@ -86,7 +86,7 @@ def test_the_tests_pass_in_debian_13(run: Run) -> None:
         paths = ["tests", "--ignore=tests/docker"]
     words = ("-q", "-p", "no:cacheprovider", "--dist=loadfile", "--no-loadscope-reorder")
     cores = os.cpu_count() or 2
-    many = f"--numprocesses={3 * cores}"  # as scripts/test
+    many = f"--numprocesses={5 * cores // 2}"  # as scripts/test
     run(".venv/bin/python", "-m", "pytest", *words, many, "-m", "not alone", *paths)
     if LONG:
         few = f"--numprocesses={cores}"

@@ -12,7 +12,6 @@ import pytest
 
 from holozen.bags.formats import format_of
 from holozen.bags.writer import BagWriter
-from holozen.command.feedback import LATE
 from holozen.messages import (
     Header,
     JointState,
@@ -27,6 +26,7 @@ from holozen.messages import (
     codec,
 )
 from holozen.testing import Wire, wait_for
+from holozen.testing.lock_step import HELD_UP
 from holozen.transport.graph import on_key
 from holozen.transport.samples import RawSubscriber, Sample
 from tests.extensions.bags.bags import played
@@ -69,9 +69,9 @@ def heard(tap: RawSubscriber, *, count: int = 0, last: list[bytes] = []) -> list
 
 
 def assert_obeyed(code: int, errors: str) -> None:
-    """It ended well; on a busy machine its last command may have been late."""
+    """It ended well; on a busy machine its last command may have been held up."""
     lines = played(errors)
-    assert code == 0 or lines[-1].startswith(tuple(f"not obeyed: {why}" for why in LATE)), errors
+    assert code == 0 or lines[-1].startswith(tuple(f"not obeyed: {why}" for why in HELD_UP)), errors
 
 
 def commands(count: int, every: float = 50.0) -> list[tuple[str, bytes, str, float]]:
