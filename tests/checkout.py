@@ -18,5 +18,5 @@ def copy(folder: Path) -> Path:
     for name in filter(None, listed.stdout.split("\0")):
         if (REPO / name).is_file():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(REPO / name, folder / name)
+            shutil.copy(REPO / name, folder / name)
     return folder
