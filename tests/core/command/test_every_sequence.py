@@ -30,6 +30,7 @@ if os.environ.get("HOLOZEN_LONG") == "1":
     ]
 
 
+@pytest.mark.timeout(900)  # the long ones take minutes
 @pytest.mark.parametrize(("sources", "with_world"), SETS)
 def test_the_promises_hold_after_every_sequence_of_events(
     sources: tuple[Source, ...], with_world: bool
