@@ -133,7 +133,7 @@ def test_the_core_alone_makes_a_wheel_and_an_editable_install(
 
 
 @pytest.mark.skipif(
-    not LONG, reason="not built: the tests of the core without each extension take twenty minutes"
+    not LONG, reason="not built: the tests of the core without each extension take twelve minutes"
 )
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("name", sorted(EXTENSIONS))
