@@ -1,9 +1,7 @@
-"""A fresh clone, and what is tried in it on other Pythons and systems: what a person does in the
-first minutes.
+"""What is tried in a fresh clone on other Pythons and systems: what a person does in the first
+minutes.
 """
 
-import shutil
-import subprocess
 from pathlib import Path
 
 REPO = Path(__file__).parents[1]
@@ -29,17 +27,6 @@ def chosen() -> list[str]:
         (path,) = (REPO / "tests").glob(file)
         found.append(f"{path.relative_to(REPO)}{colons}{test}")
     return found
-
-
-def clone(folder: Path) -> Path:
-    """A copy of what the repo holds, without a .venv."""
-    words = ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"]
-    listed = subprocess.run(words, cwd=REPO, capture_output=True, text=True, check=True).stdout
-    for name in filter(None, listed.split("\0")):
-        if (REPO / name).is_file():
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(REPO / name, folder / name)
-    return folder
 
 
 if __name__ == "__main__":

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.elsewhere import chosen, clone
+from tests.checkout import copy
+from tests.elsewhere import chosen
 
 from .stack import ROOT, docker
 
@@ -44,7 +45,7 @@ def run(engine: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]
     ).strip()
     archive = io.BytesIO()
     with tarfile.open(fileobj=archive, mode="w") as tar:
-        tar.add(clone(tmp_path_factory.mktemp("clone")), arcname=TREE)
+        tar.add(copy(tmp_path_factory.mktemp("clone")), arcname=TREE)
     subprocess.run(["docker", "cp", "-", f"{container}:/"], input=archive.getvalue(), check=True)
 
     def run(*words: str) -> str:

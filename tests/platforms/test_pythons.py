@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.elsewhere import chosen, clone
+from tests.checkout import copy
+from tests.elsewhere import chosen
 
 NEWER = (14, 13, 12)  # minor versions of Python 3
 CODE = "import sys, ensurepip; print(sys.version_info[1])"
@@ -42,7 +43,7 @@ def test_the_first_minutes_on_a_newer_python(
     found = next(newer_pythons(), None)
     if not found:
         pytest.skip("not built: there is no Python from 3.12 to 3.14")
-    tree, programs = clone(tmp_path / "holozen"), tmp_path / "programs"
+    tree, programs = copy(tmp_path / "holozen"), tmp_path / "programs"
     programs.mkdir()
     (programs / "uv").symlink_to(Path(sys.executable).with_name("uv"))
     env = os.environ | {"PATH": f"{programs}:{os.environ['PATH']}", "CI": "false"}
