@@ -13,6 +13,7 @@ import json
 import os
 import runpy
 import selectors
+import signal
 import socket
 import sys
 import termios
@@ -105,6 +106,8 @@ def _become(request: dict[str, Any], files: Sequence[int]) -> None:
 
 
 def main() -> None:
+    # as in holozen/__main__.py, so that a Ctrl-C ends a process that has not begun yet quietly
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     for verb in cli.VERBS:
         with suppress(Failure):  # an extension is left out
             cli.command(verb)

@@ -93,6 +93,14 @@ def test_what_is_forked_ends_as_it_is_told_and_with_its_test(
     )
 
 
+def test_a_ctrl_c_at_the_start_of_what_is_forked_ends_it_without_a_traceback() -> None:
+    for _ in range(20):
+        with Process(command("--version")) as process:
+            process.signal(signal.SIGINT)
+            assert process.wait() in (-signal.SIGINT, 130, 0)
+            assert not process.err
+
+
 def test_a_verb_is_forked_whatever_another_has_set_in_the_test_itself(
     wire: Wire, call: Callable[..., object], monkeypatch: pytest.MonkeyPatch
 ) -> None:
