@@ -134,7 +134,8 @@ def test_a_robot_that_does_not_obey_is_logged_with_the_reason_once(
     publisher, second = (
         node.create_publisher(Wrench, f"{wheel}_wheel_force", 1) for wheel in ("left", "rear")
     )
-    refused = reports(CommandStatus("ann@1", sources=[CommandSource(me)]), Wrench())
+    overruled = CommandStatus("ann@1", refused={"overruled": 1}, sources=[CommandSource(me)])
+    refused = reports(overruled, Wrench())
     assert refused == "/left_wheel_force: not obeyed: ann@1 drives; it has to stop first"
     second.publish(Wrench())
     assert not capfd.readouterr().err, "the first of a robot's forces reports for all of them"
