@@ -25,7 +25,7 @@ from holozen import cli, engines
 from holozen.console import Failure
 from holozen.process import dies_with_parent
 
-LIBRARIES = ("zenoh", "numpy", "xacro", "prompt_toolkit", "holozen.bus")
+LIBRARIES = ("zenoh", "numpy", "numpy.ma", "xacro", "prompt_toolkit", "holozen.bus")
 SIM = (
     "cameras",
     "entities",
