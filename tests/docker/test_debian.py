@@ -88,7 +88,9 @@ def test_the_tests_pass_in_debian_13(run: Run) -> None:
     words = ("-q", "-p", "no:cacheprovider", "--dist=loadfile", "--no-loadscope-reorder")
     cores = os.cpu_count() or 2
     many = f"--numprocesses={5 * cores // 2}"  # as scripts/test
-    run(".venv/bin/python", "-m", "pytest", *words, many, "-m", "not alone", *paths)
+    tests = (".venv/bin/python", "-m", "pytest", *words)
+    run(*tests, "--collect-only", *paths)  # makes the byte code of all tests once
+    run(*tests, many, "-m", "not alone", *paths)
     if LONG:
         few = f"--numprocesses={cores}"
-        run(".venv/bin/python", "-m", "pytest", *words, few, "-m", "alone", *paths)
+        run(*tests, few, "-m", "alone", *paths)
