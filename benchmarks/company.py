@@ -21,6 +21,8 @@ PATIENCE = 60.0  # s for the other process to come up
 ROOT = Path(__file__).resolve().parents[1]
 WITHOUT_CARD = ("--no-sandbox", "--enable-unsafe-swiftshader")
 HOLOZEN = str(Path(sys.executable).with_name("holozen"))
+PROCESSES = multiprocessing.get_context("forkserver")
+"""They are forked from one that has loaded the benchmark and has no session."""
 
 
 def chromium(playwright: Any) -> Any:
@@ -58,9 +60,9 @@ def client(endpoint: str) -> Connection:
 @contextmanager
 def beside(job: Callable[..., None], *args: Any) -> Iterator[None]:
     """Within this block another process runs `job(*args)`, which never returns."""
-    process = multiprocessing.get_context("spawn").Process(
-        target=_run, args=(job, *args), daemon=True
-    )
+    benchmark = Path(sys.modules[job.__module__].__file__ or "").stem
+    PROCESSES.set_forkserver_preload([f"benchmarks.{benchmark}"])
+    process = PROCESSES.Process(target=_run, args=(job, *args), daemon=True)
     process.start()
     try:
         yield

@@ -11,7 +11,6 @@ drives. Its third side hears them all.
 """
 
 import math
-import multiprocessing
 import re
 import sys
 import threading
@@ -23,7 +22,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from benchmarks.company import beside, client, guest, host, meeting_point, until
+from benchmarks.company import PROCESSES, beside, client, guest, host, meeting_point, until
 from benchmarks.report import Case, parser, publish
 from benchmarks.sim_loop import REST, ROBOT, WORLD, Stepper, repeated
 from holozen.bus import Bus
@@ -192,8 +191,7 @@ def side_by_side(
     """Microseconds of real time a robot and step, of `sharded` robots in `count` processes at once,
     whose odometry `is_read`.
     """
-    spawn, endpoint = multiprocessing.get_context("spawn"), meeting_point()
-    results, together = spawn.Queue(), spawn.Barrier(count)
+    results, together, endpoint = PROCESSES.Queue(), PROCESSES.Barrier(count), meeting_point()
     with ExitStack() as sims, Bus("watcher", host(endpoint)) as bus:
         odoms = bus.subscribe_raw("*/odom", depth=1) if is_read else None
         robots = sharded // count
@@ -247,7 +245,7 @@ def pilots(endpoint: str, seconds: float, hears_all: bool, results: Any) -> None
 
 def piloted(count: int, seconds: float, hears_all: bool = False) -> list[float]:
     """Milliseconds of processor time a second that PILOTS take on a bus with `count` bases."""
-    results, endpoint = multiprocessing.get_context("spawn").Queue(), meeting_point()
+    results, endpoint = PROCESSES.Queue(), meeting_point()
     with (
         beside(router, endpoint),
         beside(bases, endpoint, count),

@@ -5,14 +5,13 @@ They take turns, each in a process of its own, with the same robot. Results are 
 time and losses.
 """
 
-import multiprocessing
 import sys
 import time
 from collections.abc import Callable
 from multiprocessing.connection import Connection as Pipe
 from typing import Any
 
-from benchmarks.company import beside, guest, host, meeting_point
+from benchmarks.company import PROCESSES, beside, guest, host, meeting_point
 from benchmarks.latency import ODOM
 from benchmarks.report import Case, parser, publish
 from holozen.bus import Bus
@@ -103,9 +102,10 @@ def listen_on_bus(endpoint: str, count: int) -> Result:
 
 def in_a_process(job: Callable[[str, int], Result], endpoint: str, count: int) -> Result:
     """The result of `job`, run in a process of its own."""
-    spawn = multiprocessing.get_context("spawn")
-    here, there = spawn.Pipe()
-    process = spawn.Process(target=_send_result, args=(there, job, endpoint, count), daemon=True)
+    here, there = PROCESSES.Pipe()
+    process = PROCESSES.Process(
+        target=_send_result, args=(there, job, endpoint, count), daemon=True
+    )
     process.start()
     result: Result = here.recv()
     process.join()

@@ -27,7 +27,7 @@ TOPICS, RATE = 50, 100.0  # Hz
 # A publisher drops a message that waits for a millisecond; with more patience it is the recorder
 # that is measured.
 WAIT = ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "20000")  # us
-SECONDS, QUICK = 60.0, 1.0
+SECONDS, QUICK = 60.0, 0.3
 
 
 def send(bus: Bus, seconds: float) -> int:

@@ -9,7 +9,6 @@ with a robot. The browser has been started before, and draws without a graphics 
 """
 
 import json
-import multiprocessing
 import shutil
 import signal
 import subprocess
@@ -29,6 +28,7 @@ import zstandard
 from websockets.typing import Origin, Subprotocol
 
 from benchmarks.company import (
+    PROCESSES,
     beside,
     chromium,
     guest,
@@ -212,7 +212,7 @@ def main() -> int:
             return [cost]
 
         def looked_at() -> list[float]:
-            frames = multiprocessing.get_context("spawn").Value("q", 0)
+            frames = PROCESSES.Value("q", 0)
             with started_view(endpoint) as (view, address), beside(page, address, frames):
                 until(lambda: frames.value)
                 time.sleep(2.0 if not args.quick else 0.5)  # all robots are in the page

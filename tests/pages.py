@@ -1,6 +1,7 @@
 """Follows a page of docs/: writes its files, runs its commands, and compares what they print.
 
 python -m tests.pages NAME FOLDER
+python -m tests.pages < LINES, each NAME FOLDER
 
 - A code block with the title `FILE` is the file's content. `FILE, before TEXT` and `FILE, after
   TEXT` insert it before or after the one line of the file that holds TEXT; `FILE, instead of TEXT`
@@ -14,6 +15,7 @@ python -m tests.pages NAME FOLDER
 - A block without a language has a command a line. What goes on, such as a sim, ends with the block,
   as do variables; `record` ends after a second.
 - A `python` block without a title is run to its end. A `py` block quotes our code.
+- A shell gets what needs one; a plain `holozen` is forked, as in other tests.
 - `<!-- given: COMMAND; COMMAND -->` is what the reader has running from there on, until the next
   such line, which may say `nothing`.
 - `<!-- not run: REASON -->` stands before a block that cannot be run here, or that another test
@@ -23,15 +25,17 @@ python -m tests.pages NAME FOLDER
 import os
 import re
 import shlex
-import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Iterator, Sequence
+import traceback
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple, Self
 
-from holozen.testing import Terminal, wait_for
+from holozen.testing import Process, Terminal, wait_for
+from holozen.testing.process import START
 
 REPO = Path(__file__).parents[1]
 PAGES = sorted([*REPO.glob("docs/**/*.md"), REPO / "examples" / "fleet" / "README.md"])
@@ -47,6 +51,9 @@ GOES_ON = re.compile(
     r"|sim(?! (?:pause|play|reset|step))|topic (?:echo|hz|pub)(?!.* --(?:once|times)))\b|zenoh .* "
     r"subscribe|.* &$"
 )
+QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"")
+PLAIN = re.compile(r"(?:env )?(?:\w+=\S+ )*holozen(?: [^#|&;<>$*?~`(){}\\]*)?")
+"""Where nothing is left for a shell to do but to take off the quotes."""
 EDIT = re.compile(r"(?P<file>[^,]+)(?:, (?P<how>before|after|instead of) (?P<where>.+))?")
 READ = {"py", "text", "toml", "xml"}  # blocks that are only read
 WITHIN = 60.0  # s for a command
@@ -69,6 +76,15 @@ def commands(block: str) -> Iterator[Command]:
             yield Command(line.partition("  #")[0].strip(), shown.strip())
 
 
+def started(line: str) -> tuple[list[str], dict[str, str]]:
+    """The words that start a command, and its own variables."""
+    if not PLAIN.fullmatch(QUOTED.sub("_", line)):
+        return ["bash", "-c", line], {}
+    words = shlex.split(line.removeprefix("env "))
+    at = words.index("holozen")
+    return [*START, *words[at + 1 :]], dict(word.split("=", 1) for word in words[:at])
+
+
 def same(shown: str, printed: str) -> bool:
     """Whether the lines shown are among the lines printed, in this order."""
     left = iter(plain(printed).replace("\r", "\n").splitlines())
@@ -89,13 +105,17 @@ class Reader:
     def __init__(self, folder: Path) -> None:
         self.folder, self.terminals = folder, dict[str, Terminal]()
         self.given, self.started = list[Terminal](), list[Terminal]()
+        self.variables = dict(os.environ)
 
     def __enter__(self) -> Self:
+        os.environ["HOME"] = str(self.folder)
+        os.chdir(self.folder)
         return self
 
     def __exit__(self, *_error: object) -> None:
         for terminal in (*self.terminals.values(), *self.started, *self.given):
             terminal.close()
+        set_variables(self.variables)
 
     def follow(self, page: Path) -> int:  # noqa: C901 - a case for each kind of step
         """Do each step; their number. AssertionError with the step that does not do what the page
@@ -118,8 +138,7 @@ class Reader:
                 self.begin(step["text"].splitlines(), self.started)
                 time.sleep(MORE if self.started else 0.0)
                 end(self.started)
-                os.environ.clear()
-                os.environ |= variables
+                set_variables(variables)
             elif step["language"] == "console" and step["title"]:
                 self.attend(step["title"], step["text"])
             elif step["language"] == "console":
@@ -164,7 +183,10 @@ class Reader:
 
     def open(self, line: str) -> Terminal:
         """A command in a terminal of its own."""
-        return Terminal(["bash", "-c", f"cd '{self.folder}' && exec {line}"], env={"NO_COLOR": "1"})
+        words, variables = started(line)
+        if words[0] == "bash":
+            words[-1] = f"exec {line}"
+        return Terminal(words, env={"NO_COLOR": "1", **variables})
 
     def write(self, title: str, text: str) -> None:
         edit = EDIT.fullmatch(title)
@@ -185,22 +207,20 @@ class Reader:
     def run(self, command: Command) -> None:
         if command.line.startswith("cd "):
             self.folder /= Path(command.line.removeprefix("cd ")).expanduser()
+            os.chdir(self.folder)
             return
-        done = subprocess.run(
-            ["bash", "-c", command.line],
-            cwd=self.folder,
-            stdin=subprocess.DEVNULL,
-            text=True,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            timeout=WITHIN,
-        )
+        words, variables = started(command.line)
+        with (
+            tempfile.TemporaryFile() as output,
+            Process(words, env=variables, stdout=output, stderr=output) as process,
+        ):
+            code = process.wait(WITHIN)
+            output.seek(0)
+            printed = output.read().decode(errors="replace")
         wrong = "error" in command.shown
-        assert (done.returncode != 0) == wrong, (
-            f"$ {command.line}\n{done.stdout}exit code {done.returncode}"
-        )
-        assert same(command.shown, done.stdout), (
-            f"$ {command.line}\n{done.stdout}\ninstead of\n{command.shown}"
+        assert (code != 0) == wrong, f"$ {command.line}\n{printed}exit code {code}"
+        assert same(command.shown, printed), (
+            f"$ {command.line}\n{printed}\ninstead of\n{command.shown}"
         )
 
     def attend(self, name: str, text: str) -> None:
@@ -252,15 +272,32 @@ def plain(text: str) -> str:
     return re.sub(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|\][^\x07\x1b]*(?:\x07|\x1b\\)|.)", "", text)
 
 
-def main(name: str, folder: Path) -> None:
-    """Follow a page, at home in the folder, in a shell in which .venv is active."""
-    os.environ |= {
-        "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
-        "HOME": str(folder),
-    }
-    with Reader(folder) as reader:
-        print(f"{reader.follow(REPO / f'{name}.md')} steps")
+def set_variables(variables: dict[str, str]) -> None:
+    """Give this process, and what it starts, these variables and no others."""
+    os.environ.clear()
+    os.environ |= variables
+
+
+def follow(name: str, folder: str) -> None:
+    """Follow a page, at home in the folder."""
+    with Reader(Path(folder)) as reader:
+        print(f"{name}: {reader.follow(REPO / f'{name}.md')} steps", flush=True)
+
+
+def follow_all(lines: Iterable[str]) -> None:
+    """Follow the pages of these lines. What is wrong with one comes before its `NAME: failed`."""
+    for line in lines:
+        name, folder = line.rstrip("\n").split(" ", 1)
+        try:
+            follow(name, folder)
+        except Exception:
+            traceback.print_exc()
+            print(f"{name}: failed", flush=True)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], Path(sys.argv[2]))
+    os.environ["PATH"] = f"{Path(sys.executable).parent}:{os.environ['PATH']}"  # .venv is active
+    if sys.argv[1:]:
+        follow(*sys.argv[1:])
+    else:
+        follow_all(sys.stdin)

@@ -188,7 +188,7 @@ def _impossible_inertia(subject: Subject) -> Iterator[Mistake]:
 @rule(
     "inertia-part",
     "warning",
-    "an <inertia> without its six values",
+    "an inertia without its six values",
     "ROS and Gazebo do not load the robot",
 )
 def _incomplete_inertia(subject: Subject) -> Iterator[Mistake]:

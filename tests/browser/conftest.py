@@ -1,13 +1,13 @@
 """One sim, one view and one Chromium for the tests of a file."""
 
 import shutil
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, sync_playwright
 
-from holozen.testing import Process, Wire
+from holozen.testing import Process, Wire, wait_for
 
 SOFTWARE_WEBGL = ("--enable-unsafe-swiftshader",)
 
@@ -40,6 +40,13 @@ def address(view: Process) -> str:
     """The address that a view prints."""
     view.wait_for_line("http://")
     return next(word for word in view.err.split() if word.startswith("http://"))
+
+
+def is_soon(condition: Callable[[], bool]) -> bool:
+    try:
+        return wait_for(condition, 1.5)
+    except AssertionError:
+        return False
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ each way that ends.
 import json
 import math
 import os
+import re
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,6 +18,8 @@ from playwright.sync_api import Browser, BrowserContext, Page, Route
 from holozen import data, entities
 from holozen.messages import (
     CommandStatus,
+    GetSceneReply,
+    GetSceneRequest,
     Header,
     Image,
     Odometry,
@@ -24,12 +27,12 @@ from holozen.messages import (
     TriggerReply,
     TriggerRequest,
 )
-from holozen.spawning import SpawnPose, spawn_file
+from holozen.spawning import SpawnPose, put, read, spawn_file
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.pubsub import Latest
 from tests.faults.proxy import Proxy
 
-from .conftest import TOKEN, address
+from .conftest import TOKEN, address, is_soon
 
 pytestmark = [pytest.mark.needs("chromium"), pytest.mark.alone]
 
@@ -86,40 +89,73 @@ def link(view: str) -> Iterator[Proxy]:
 Open = Callable[..., Page]
 
 
+def new_page(chromium: Browser, faults: list[str], **options: Any) -> Page:
+    """A page in a context of its own, whose errors are added to `faults`. Its scene is left out:
+    those of test_view.py are drawn.
+    """
+    context = chromium.new_context(**{"viewport": DESK, **options})
+    context.route(
+        "**/scene/**",
+        lambda route: route.fulfill(body="<title>a scene</title>", content_type="text/html"),
+    )
+    page = context.new_page()
+    page.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    return page
+
+
+def load(page: Page, address: str, ready: str = "hb_bot") -> None:
+    """Load a page, and wait until it may drive."""
+    page.goto(address)
+    if ready:
+        page.get_by_role("button", name=ready).wait_for()
+        page.locator("#driver:text('ready')").wait_for()
+
+
+def ours(faults: list[str]) -> list[str]:
+    """Those errors that are ours; that a network is lost is a browser's."""
+    return [one for one in faults if "WebSocket" not in one]
+
+
 @pytest.fixture
 def opened(chromium: Browser, view: str, sim: Process) -> Iterator[Open]:
-    """Opens pages and waits until they may drive. Their scenes are left out: those of test_view.py
-    are drawn.
-    """
+    """Opens pages of the test's own, and waits until they may drive."""
     contexts: list[BrowserContext] = []
     faults: list[str] = []
 
-    def page(address: str = view, ready: str = "hb_bot", **options: Any) -> Page:
-        contexts.append(context := chromium.new_context(**{"viewport": DESK, **options}))
-        context.route(
-            "**/scene/**",
-            lambda route: route.fulfill(body="<title>a scene</title>", content_type="text/html"),
-        )
-        page = context.new_page()
-        page.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
-        page.on("pageerror", lambda error: faults.append(str(error)))
-        page.goto(address)
-        if ready:
-            page.get_by_role("button", name=ready).wait_for()
-            page.locator("#driver:text('ready')").wait_for()
+    def opened(address: str = view, ready: str = "hb_bot", **options: Any) -> Page:
+        page = new_page(chromium, faults, **options)
+        contexts.append(page.context)
+        load(page, address, ready)
         return page
 
-    yield page
+    yield opened
     for context in contexts:
         context.close()
-    assert [
-        one for one in faults if "WebSocket" not in one
-    ] == []  # a lost network is a browser's error, not ours
+    assert ours(faults) == []
+
+
+@pytest.fixture(scope="module")
+def window(chromium: Browser) -> Iterator[tuple[Page, list[str]]]:
+    """A page of the file, and its errors."""
+    faults: list[str] = []
+    page = new_page(chromium, faults)
+    yield page, faults
+    page.context.close()
 
 
 @pytest.fixture
-def page(opened: Open) -> Page:
-    return opened()
+def page(window: tuple[Page, list[str]], view: str, sim: Process) -> Iterator[Page]:
+    """A page that is loaded anew, with nothing held, and may drive."""
+    page, faults = window
+    for key in KEYS:
+        page.keyboard.up(key)
+    page.mouse.up()
+    load(page, view)
+    yield page
+    page.goto("about:blank")  # it lets go, and no other test sees it
+    seen, faults[:] = ours(faults), []
+    assert seen == []
 
 
 def velocity(odom: Latest[Odometry]) -> tuple[float, float, float]:
@@ -466,8 +502,13 @@ def test_an_old_picture_is_covered_and_who_drives_by_it_stops(
     page.locator("#picture").wait_for(state="hidden")
 
 
-def test_a_robot_that_was_heard_before_its_sim_stays_chosen(wire: Wire, opened: Open) -> None:
+def test_without_a_robot_a_sheet_says_so_until_one_is_heard_which_stays_chosen_when_its_sim_comes(
+    wire: Wire, opened: Open
+) -> None:
     page = opened(address(wire.start("view", "--port", "0")), ready="")
+    sheet = page.get_by_text("No robot is heard.")
+    sheet.wait_for()
+    page.get_by_text("holozen up").wait_for()
     with wire.bus("base") as base:
         odom = base.publisher("odom", Odometry)
 
@@ -476,20 +517,32 @@ def test_a_robot_that_was_heard_before_its_sim_stays_chosen(wire: Wire, opened: 
             return page.locator("#driver:text('ready')").is_visible()
 
         wait_for(has_chosen)
-    wire.start("sim")
+        sheet.wait_for(state="hidden")
+    sim = wire.start("sim")
     page.locator("#robots").get_by_text("hb_bot").wait_for()
     page.locator("#driver:text('ready')").wait_for()
-
-
-def test_without_a_robot_a_sheet_says_so_until_one_comes(wire: Wire, opened: Open) -> None:
-    page = opened(address(wire.start("view", "--port", "0")), ready="")
-    page.get_by_text("No robot is heard.").wait_for()
-    page.get_by_text("holozen up").wait_for()
-    sim = wire.start("sim")
-    page.get_by_text("No robot is heard.").wait_for(state="hidden")
-    page.locator("#driver:text('ready')").wait_for()
     sim.kill()
-    page.get_by_text("No robot is heard.").wait_for()
+    sheet.wait_for()
+
+
+def test_the_sims_are_asked_for_the_scene_less_often_while_no_page_is_open(
+    wire: Wire, opened: Open
+) -> None:
+    requests: list[GetSceneRequest] = []
+
+    def answer(request: GetSceneRequest) -> GetSceneReply:
+        requests.append(request)
+        return GetSceneReply()
+
+    def is_busy() -> bool:
+        before = len(requests)
+        return is_soon(lambda: len(requests) > before + 5)
+
+    wire.bus("sim").serve("get_scene", GetSceneRequest, GetSceneReply, answer).start()
+    page = opened(address(wire.start("view", "--port", "0")), ready="")
+    wait_for(is_busy, what="many requests")
+    page.close()
+    wait_for(lambda: not is_busy(), what="few requests")
 
 
 def test_no_other_web_site_and_nobody_without_the_token_gets_in(
@@ -568,8 +621,11 @@ def test_a_switch_lets_a_robot_stop_before_what_its_lidar_sees_and_the_page_says
 ) -> None:
     bus, file = town.bus("builder"), tmp_path / "wall.sdf"
     file.write_text(WALL)
+    explorer, scout_file = data.find("urdf", "explorer.urdf.xacro"), tmp_path / "scout.urdf.xacro"
+    camera = '<gazebo reference="camera_link">.*?</gazebo>'  # pictures would take long to render
+    scout_file.write_text(re.sub(camera, "", explorer.read_text(), flags=re.DOTALL))
     spawn_file(bus, file, "wall", SpawnPose(x=2.0, y=20.0))
-    spawn_file(bus, data.find("urdf", "explorer.urdf.xacro"), "Scout", SpawnPose(y=20.0))
+    put(bus, read(scout_file, "Scout", packages={"holo": explorer.parents[1]}), SpawnPose(y=20.0))
     scout = bus.latest("Scout/odom", Odometry)
     page = opened()
     page.locator("#menu").click()

@@ -17,8 +17,6 @@ from playwright.sync_api import Browser, Page
 from holozen import data, entities
 from holozen.bus import Bus
 from holozen.messages import (
-    GetSceneReply,
-    GetSceneRequest,
     Header,
     LaserScan,
     Odometry,
@@ -47,15 +45,15 @@ from holozen.view.open_page import ASIDE, BACK, UP
 from holozen.view.scene import FIELD
 from tests.extensions.bags.bags import a_bag
 
-from .conftest import address
+from .conftest import address, is_soon
 
 pytestmark = [pytest.mark.needs("chromium"), pytest.mark.alone]
 
 TOP, DECK_HEIGHT = 48, 208  # pixels of the page above the scene, and below it
 # pixels of the scene; a software renderer takes its time for each
 SIZE = {"width": 960, "height": 320}
-# columns without controls of the page; its notices are below
-FREE = (np.arange(SIZE["width"]) > 250) & (np.arange(SIZE["width"]) < 620)
+# pixels of the scene without controls of the page; its notices are below
+FREE: Any = {"x": 251, "y": 0, "width": 369, "height": 250}
 DEPTH = -0.04  # m; the height at which hb_bot stands
 DECK = 0.295  # m; the height of hb_bot's orange deck
 EXACT = 7  # pixels; the same for a camera that is where it has to be
@@ -189,12 +187,9 @@ def pixel(
 
 def colored(page: Page, color: Callable[[Any, Any, Any], Any]) -> list[tuple[int, int]]:
     """The pixels (x, y) of a colour."""
-    clip: Any = {"x": 0, "y": TOP, **SIZE}
-    picture = Picture.open(io.BytesIO(page.screenshot(clip=clip))).convert("RGB")
-    red, green, blue = np.asarray(picture, float).transpose(2, 0, 1)
-    rows, columns = np.nonzero(
-        color(red, green, blue) & FREE & (np.arange(SIZE["height"]) < 250)[:, None]
-    )
+    picture = Picture.open(io.BytesIO(page.screenshot(clip=FREE | {"y": TOP + FREE["y"]})))
+    red, green, blue = np.asarray(picture.convert("RGB"), np.float32).transpose(2, 0, 1)
+    rows, columns = np.nonzero(color(red, green, blue)) + np.array([[FREE["y"]], [FREE["x"]]])
     return list(zip(columns.tolist(), rows.tolist(), strict=True))
 
 
@@ -209,16 +204,39 @@ def shows_it_at(page: Page, x: float, y: float, within: float = NEAR) -> bool:
     return middle is not None and math.dist(middle, pixel(x, y, DECK)) < within
 
 
-def is_soon(condition: Callable[[], bool]) -> bool:
-    try:
-        return wait_for(condition, 1.5)
-    except AssertionError:
-        return False
-
-
 def stands(odom: Latest[Odometry]) -> bool:
     message = odom.read()[0]
     return message is not None and message.twist.twist.is_slow(0.01)
+
+
+def test_a_bag_is_played_with_a_slider_for_its_time(
+    town: Wire, opened: Open, tmp_path: Path
+) -> None:
+    bag = town.start("view", "--port", "0", str(a_bag(tmp_path / "a.mcap")))
+    # its 2 s are over; and no other page of this file is open yet, which would be drawn as well
+    page = opened(address(bag), ready="paused")
+
+    def shows_arrow() -> bool:
+        """After the camera was aimed anew: a page that opens slowly may replace it by its own."""
+        for view in ("Top", "Follow"):
+            page.get_by_role("button", name=view, exact=True).click()
+        return is_soon(lambda: shows_arrow_at(page))
+
+    wait_for(shows_arrow, what="a robot without a description")
+    page.get_by_label("Time, s").fill("0.5")
+    page.locator("#at:text('0.5 s')").wait_for()
+    assert not page.get_by_role("button", name="STOP", exact=True).is_visible(), (
+        "a bag is not driven"
+    )
+    page.close()
+
+
+def shows_arrow_at(page: Page) -> bool:
+    """Whether the orange arrow of a robot without a description is in the middle."""
+    middle = deck(page)
+    return (
+        middle is not None and math.dist(middle, (SIZE["width"] / 2, SIZE["height"] / 2)) < 4 * NEAR
+    )
 
 
 def test_the_robot_is_where_its_odometry_places_it_in_its_colours_and_moves_when_driven(
@@ -578,52 +596,3 @@ def test_the_camera_follows_goes_behind_and_looks_down(
             put(bus, odom, x, 2.0)
             wait_for(in_the_middle, what=f"the robot at {x} in the middle of {view}")
     page.get_by_role("button", name="Free").click()
-
-
-def test_a_bag_is_played_with_a_slider_for_its_time(
-    town: Wire, opened: Open, tmp_path: Path
-) -> None:
-    bag = town.start("view", "--port", "0", str(a_bag(tmp_path / "a.mcap")))
-    page = opened(address(bag), ready="paused")  # its 2 s are over
-
-    def shows_arrow() -> bool:
-        """After the camera was aimed anew: a page that opens slowly may replace it by its own."""
-        for view in ("Top", "Follow"):
-            page.get_by_role("button", name=view, exact=True).click()
-        return is_soon(lambda: shows_arrow_at(page))
-
-    wait_for(shows_arrow, what="a robot without a description")
-    page.get_by_label("Time, s").fill("0.5")
-    page.locator("#at:text('0.5 s')").wait_for()
-    assert not page.get_by_role("button", name="STOP", exact=True).is_visible(), (
-        "a bag is not driven"
-    )
-    page.close()
-
-
-def shows_arrow_at(page: Page) -> bool:
-    """Whether the orange arrow of a robot without a description is in the middle."""
-    middle = deck(page)
-    return (
-        middle is not None and math.dist(middle, (SIZE["width"] / 2, SIZE["height"] / 2)) < 4 * NEAR
-    )
-
-
-def test_the_sims_are_asked_for_the_scene_less_often_while_no_page_is_open(
-    wire: Wire, opened: Open
-) -> None:
-    requests: list[GetSceneRequest] = []
-
-    def answer(request: GetSceneRequest) -> GetSceneReply:
-        requests.append(request)
-        return GetSceneReply()
-
-    def is_busy() -> bool:
-        before = len(requests)
-        return is_soon(lambda: len(requests) > before + 5)
-
-    wire.bus("sim").serve("get_scene", GetSceneRequest, GetSceneReply, answer).start()
-    page = opened(address(wire.start("view", "--port", "0")), ready="no robot")
-    wait_for(is_busy, what="many requests")
-    page.close()
-    wait_for(lambda: not is_busy(), what="few requests")

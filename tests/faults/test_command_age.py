@@ -26,12 +26,12 @@ from .proxy import Proxy
 
 pytestmark = NEEDS
 
-DELAYS = [(0.15, True), (0.4, False), (2.0, False), (0.1, True)]
+DELAYS = [(0.15, True), (0.4, False), (0.1, True)]
 """Delays of a link in s, one way, one after another; and whether the robot is driven over it: a
 command's echo is a round trip old.
 """
 if os.environ.get("HOLOZEN_LONG") == "1":
-    DELAYS += [(0.05, True), (1.0, False), (0.1, True)]
+    DELAYS += [(2.0, False), (0.05, True), (1.0, False), (0.1, True)]
 APART = 0.0001  # m/s between a command and the next
 
 

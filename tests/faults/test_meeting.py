@@ -6,6 +6,7 @@ import socket
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -44,38 +45,44 @@ def test_a_process_gets_in_over_a_slow_link(wire: Wire, proxy: Proxy) -> None:
         list(pool.map(gets_in, ("client", "peer")))
 
 
-@pytest.mark.parametrize("mode", ["client", "peer"])
 def test_over_a_slow_link_a_verb_sees_the_nodes_and_reports_what_it_waits_for_and_a_stop_reaches_the_robot(  # noqa: E501
-    wire: Wire, proxy: Proxy, mode: str
+    wire: Wire, proxy: Proxy
 ) -> None:
     wire.start("sim").wait_for_line("listens on")
     proxy.set(delay=DELAY)
-    where = ("--mode", mode, "--connect", proxy.endpoint)
-    with (
-        Process(command("node", "list", *where)) as listing,
-        Process(command("stop", "--timeout", "15", *where)) as stop,
-    ):
-        assert listing.wait() == 0
-        assert listing.out == "sim\n"
-        waited = {"client": f"waiting for a Zenoh router at {proxy.endpoint}\n"}
-        assert listing.err == waited.get(mode, f"waiting for an answer from {proxy.endpoint}\n")
-        assert stop.wait() == 0
-        assert stop.out in STOPPED
+    waited = {"client": "a Zenoh router at", "peer": "an answer from"}
+    with ExitStack() as ends:
+        listings, stops = (
+            {
+                mode: ends.enter_context(
+                    Process(command(*verb, "--mode", mode, "--connect", proxy.endpoint))
+                )
+                for mode in waited
+            }
+            for verb in (("node", "list"), ("stop", "--timeout", "15"))
+        )
+        for mode, listing in listings.items():
+            assert listing.wait() == 0
+            assert listing.out == "sim\n"
+            assert listing.err == f"waiting for {waited[mode]} {proxy.endpoint}\n"
+        for stop in stops.values():
+            assert stop.wait() == 0
+            assert stop.out in STOPPED
 
 
-@pytest.mark.parametrize(("mode", "number"), [("client", signal.SIGINT), ("peer", signal.SIGTERM)])
-def test_what_waits_for_an_answer_ends_at_once_on_a_signal(
-    wire: Wire, proxy: Proxy, mode: str, number: signal.Signals
-) -> None:
+def test_what_waits_for_an_answer_ends_at_once_on_a_signal(wire: Wire, proxy: Proxy) -> None:
     wire.start("router").wait_for_line("listens")
     proxy.set(delay=3600)
-    with Process(
-        command("sim", "--mode", mode, "--connect", proxy.endpoint, "--listen", "tcp/127.0.0.1:0")
-    ) as sim:
-        sim.wait_for_line("waiting for a")
-        sim.signal(number)
-        assert sim.wait() == 0
-        assert "Traceback" not in sim.err
+    where = ("--connect", proxy.endpoint, "--listen", "tcp/127.0.0.1:0")
+    with (
+        Process(command("sim", "--mode", "client", *where)) as client,
+        Process(command("sim", "--mode", "peer", *where)) as peer,
+    ):
+        for sim, number in ((client, signal.SIGINT), (peer, signal.SIGTERM)):
+            sim.wait_for_line("waiting for a")
+            sim.signal(number)
+            assert sim.wait() == 0
+            assert "Traceback" not in sim.err
 
 
 def notes(err: str) -> list[str]:
@@ -150,17 +157,19 @@ def test_a_client_that_opens_while_the_port_changes_hands_tries_again(wire: Wire
             assert "pose:" in echo.out
 
 
-def test_where_nobody_answers_a_verb_names_who_is_there_and_fails(wire: Wire) -> None:
-    hung = asleep(wire)
-    for verb in VERBS:
-        process = wire.start(*verb)
-        assert process.wait(30) == 1
-        waiting, why = process.err.splitlines()
-        assert (
-            waiting == f"waiting for an answer from the group 224.0.0.224:{wire.port} on loopback"
-        )
-        assert f"does not answer; continue it: kill -CONT {hung.pid}" in why
-        assert process.out == ""
+def test_where_nobody_answers_a_verb_names_who_is_there_and_fails() -> None:
+    with ExitStack() as ends:
+        # each on a wire of its own, else they meet each other
+        wires = [ends.enter_context(Wire()) for _ in VERBS]
+        hung = [asleep(wire) for wire in wires]
+        started = [wire.start(*verb) for wire, verb in zip(wires, VERBS, strict=True)]
+        for wire, sleeper, process in zip(wires, hung, started, strict=True):
+            assert process.wait(30) == 1
+            waiting, why = process.err.splitlines()
+            group = f"the group 224.0.0.224:{wire.port} on loopback"
+            assert waiting == f"waiting for an answer from {group}"
+            assert f"does not answer; continue it: kill -CONT {sleeper.pid}" in why
+            assert process.out == ""
 
 
 MESSAGES = (
@@ -202,9 +211,9 @@ def test_an_access_control_list_has_to_allow_the_tokens_of_nodes(
         command("router", "--config", str(path), "--cfg", "scouting/multicast/enabled:false")
     ) as router:
         router.wait_for_line("listens at")
-        with Process(command("sim", *client)) as sim:
+        with Process(command("sim", *client)) as sim, ThreadPoolExecutor() as pool:
             sim.wait_for_line("listens on")
-            listed, stop = (run(command(*verb, *client), 60) for verb in VERBS)
+            listed, stop = pool.map(lambda verb: run(command(*verb, *client), 60), VERBS)
     assert stop.stdout in STOPPED
     if len(allowed) > 1:
         assert "odom" in listed.stdout.split()

@@ -7,7 +7,7 @@ import pytest
 from .soak import soak
 
 LONG = os.environ.get("HOLOZEN_LONG") == "1"
-MINUTES = 10.0 if LONG else 0.15
+MINUTES = 10.0 if LONG else 0.1
 
 
 @pytest.mark.timeout(120 + 90 * MINUTES)

@@ -4,6 +4,7 @@ import json
 import math
 import signal
 from collections.abc import Iterator
+from itertools import groupby
 from typing import Any
 
 import pytest
@@ -98,7 +99,7 @@ def test_the_robot_drives_to_a_pose_and_tells_how_far_it_is(town: Wire, robot: R
 def test_the_robot_follows_waypoints_from_an_index_on_and_in_loops(
     town: Wire, robot: Robot
 ) -> None:
-    poses = [pose(0.3), pose(0.3, 0.1), pose(0.2, 0.1)]
+    poses = [pose(0.3), pose(0.2, 0.1)]
     process = send(
         town, "follow_waypoints", {"poses": poses, "goal_index": 1, "number_of_loops": 1}
     )
@@ -111,8 +112,7 @@ def test_the_robot_follows_waypoints_from_an_index_on_and_in_loops(
         for line in process.out.splitlines()
         if "feed" in line
     ]
-    assert list(dict.fromkeys(numbers)) == [1, 2, 0]
-    assert numbers[-1] == 2
+    assert [number for number, _ in groupby(numbers)] == [1, 0, 1]
     assert place(robot.stands())[:2] == pytest.approx((0.2, 0.1), abs=0.05)
 
 
@@ -202,11 +202,10 @@ def test_a_controller_that_ends_and_a_sim_that_dies_end_the_goal(wire: Wire) -> 
     [
         ([("sim", "reset", "--scope", "time")], RESET),
         ([("sim", "reset", "--scope", "state")], RESET),
-        ([("sim", "reset", "--scope", "spawned")], RESET),
         ([(*SPAWN, "--replace")], REMOVED),
         ([("delete", "Fred"), SPAWN], REMOVED),
     ],
-    ids=["time", "state", "spawned", "replaced", "deleted and spawned"],
+    ids=["time", "state", "replaced", "deleted and spawned"],
 )
 def test_a_goal_is_not_driven_to_by_the_next_robot_or_after_a_reset(
     freds: Wire, verb: Verb, verbs: list[tuple[str, ...]], reason: str
@@ -218,7 +217,7 @@ def test_a_goal_is_not_driven_to_by_the_next_robot_or_after_a_reset(
         assert verb(freds, *words).returncode == 0
     fred.stands()
     odoms = fred.odom.from_now()
-    fred.pass_time(1.0)
+    fred.pass_time(0.5)
     # a spawned one comes to rest on the floor
     assert all(moves(odom, 0, 0, 0) for odom in odoms.messages())
     assert aborted(goal) == reason

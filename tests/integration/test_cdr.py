@@ -96,34 +96,6 @@ def test_json_still_drives(robot: Robot) -> None:
     robot.drive(0.2)
 
 
-def test_a_bad_command_is_refused_with_its_reason(robot: Robot, foreign: zenoh.Session) -> None:
-    for payload, encoding, kind, reason in [
-        (twist(0.3)[:-1], "application/cdr", "malformed", "not a Twist: cut off after 51 bytes"),
-        (
-            twist(0.3),
-            "application/cdr;geometry_msgs/msg/Accel",
-            "malformed",
-            "encoding names geometry_msgs/msg/Accel",
-        ),
-        (twist(float("nan")), "application/cdr", "not finite", "linear.x is not a finite number"),
-        (twist(float("inf")), "application/cdr", "not finite", "linear.x is not a finite number"),
-        (b"\x00\x01\x00\x00" + b"\xff" * 600, "application/cdr", "malformed", "552 bytes too many"),
-    ]:
-        before = robot.status().refused.get(kind, 0)
-
-        def refused(
-            payload: bytes = payload,
-            encoding: str = encoding,
-            kind: str = kind,
-            before: int = before,
-        ) -> str:
-            foreign.put("cmd_vel", payload, encoding=encoding)
-            status = robot.status()
-            return status.last_refusal if status.refused.get(kind, 0) > before else ""
-
-        assert reason in wait_for(refused)
-
-
 def test_services_answer_in_cdr(only_robot: tuple[Wire, Robot], robot: Robot) -> None:
     wire = only_robot[0]
     service = wire.start("pose-service", "--wire", "cdr")

@@ -1,7 +1,7 @@
 """Robots that cannot be: each ends in one line, and the sim goes on."""
 
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -72,7 +72,6 @@ def joint(parent: str, child: str) -> str:
 LAUGHS = "<!DOCTYPE r [<!ENTITY a 'ha'>" + "".join(
     f"<!ENTITY {b} '{f'&{a};' * 10}'>" for a, b in zip("abcdefghi", "bcdefghij", strict=True)
 )
-MANY = "(a hundred million bytes)"  # made where they are needed
 FAULTS: dict[str, tuple[str, str]] = {
     "an empty file": ("", "the file is empty"),
     "an unclosed tag": ('<robot name="r">\n<link name="a">', "line 2: broken XML"),
@@ -96,28 +95,20 @@ FAULTS: dict[str, tuple[str, str]] = {
         "without end",
     ),
     "9**9**9": (XACRO.format('<link name="${9**9**9}"/>'), "9**9**9"),
-    "a hundred million bytes": (f"<robot name='r'><!--{MANY}--></robot>", "MB"),
 }
 
 
-# Each is read by the verb itself; errors in the others are reported in the same way by the same
-# reader.
-AT_THE_VERB = ("an unclosed tag", "9**9**9", "a hundred million bytes")
-
-
-@pytest.mark.parametrize("fault", AT_THE_VERB)
-def test_an_impossible_robot_is_one_error_line(
-    town: Wire, bus: Bus, tmp_path: Path, fault: str
-) -> None:
-    text, reported = FAULTS[fault]
-    file = tmp_path / ("r.urdf.xacro" if "xmlns:xacro" in text else "r.urdf")
-    file.write_text(text.replace(MANY, 100_000_000 * "x"))
+def test_an_impossible_robot_is_one_error_line(town: Wire, bus: Bus, tmp_path: Path) -> None:
+    """Errors in the others are reported in the same way by the same reader."""
+    text, reported = FAULTS["an unclosed tag"]
+    file = tmp_path / "r.urdf"
+    file.write_text(text)
     ended = town.run(*SPAWN, str(file), "--name", "Fred", within=LIMIT)
     assert_one_line(ended, 1, str(file), reported)
 
 
-def triangles(count: int, bad: float = 0.0) -> bytes:
-    """A binary STL."""
+def triangles(count: int, bad: float) -> bytes:
+    """A binary STL with a bad number."""
     corners = np.random.default_rng(1).random((count, 12), dtype=np.float32)
     corners[0, 3] += bad
     records = np.zeros(count, dtype=[("numbers", "<f4", 12), ("attribute", "<u2")])
@@ -125,28 +116,18 @@ def triangles(count: int, bad: float = 0.0) -> bytes:
     return bytes(80) + struct.pack("<I", count) + records.tobytes()
 
 
-MESHES: dict[str, tuple[Callable[[], bytes], str]] = {
-    "not a number": (lambda: triangles(10, float("nan")), "finite"),
-    "a million triangles": (lambda: triangles(1_000_000), ""),
-}
-
-
-@pytest.mark.parametrize("fault", MESHES)
 def test_an_unusable_mesh_is_one_warning_and_the_robot_stands_on_a_box(
-    town: Wire, bus: Bus, tmp_path: Path, fault: str
+    town: Wire, bus: Bus, tmp_path: Path
 ) -> None:
-    make, reported = MESHES[fault]
-    (tmp_path / "part.stl").write_bytes(make())
+    (tmp_path / "part.stl").write_bytes(triangles(10, float("nan")))
     file = tmp_path / "r.urdf"
     file.write_text(robot(link("a", INERTIAL.format(1) + MESH.format("part.stl")) + DRIVE))
     ended = town.run(*SPAWN, str(file), "--name", "Fred", within=3 * LIMIT)
     assert (ended.returncode, ended.stdout) == (0, "Fred listens on Fred/cmd_vel\n")
-    lines = ended.stderr.splitlines()
-    assert len(lines) <= 1 and all("part.stl" in line and reported in line for line in lines)
-    assert bool(lines) or not reported
+    (line,) = ended.stderr.splitlines()
+    assert "part.stl" in line and "finite" in line
     entities.delete(bus, "Fred")
-    if reported:
-        assert town.run(*SPAWN, str(file), "--strict", within=3 * LIMIT).returncode == 1
+    assert town.run(*SPAWN, str(file), "--strict", within=3 * LIMIT).returncode == 1
 
 
 def test_four_hundred_links_are_a_robot_like_any_other(
@@ -165,7 +146,7 @@ def test_four_hundred_links_are_a_robot_like_any_other(
     entities.delete(bus, "Fred")
 
 
-RAW = {fault: text for fault, (text, _) in FAULTS.items() if MANY not in text} | {
+RAW = {fault: text for fault, (text, _) in FAULTS.items()} | {
     "200 000 links": robot(link("a") * 200_000),
     "elements without end": "<robot>" + "<a>" * 300_000,
     "fifteen million bytes": robot("x" * 15_000_000),

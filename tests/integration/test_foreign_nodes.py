@@ -26,7 +26,7 @@ SHOWN = "linear:\n  x: 1.5\n  y: 0.0\n  z: -2.0\nangular:\n  x: 0.0\n  y: 0.0\n 
 
 @pytest.fixture(scope="module")
 def town() -> Iterator[Wire]:
-    """A place where a foreign node puts all of PUTS at 100 Hz; of ours only one that holds a
+    """A place where a foreign node puts all of PUTS at 25 Hz; of ours only one that holds a
     meeting point.
     """
     with Wire() as wire:
@@ -41,7 +41,7 @@ def town() -> Iterator[Wire]:
 
 
 def _talk(session: zenoh.Session, done: threading.Event) -> None:
-    while not done.wait(0.01):
+    while not done.wait(0.04):
         for key, (payload, encoding) in PUTS.items():
             session.put(key, payload, encoding=encoding)
 
@@ -150,21 +150,20 @@ def test_an_unknown_field_of_a_key_is_an_error_with_the_closest(verb: Verb, town
 def test_rates_and_sizes_of_foreign_samples_are_reported_without_losses(
     verb: Verb, town: Wire
 ) -> None:
+    done = verb(town, "topic", "hz", "a/json", "--once")
+    assert done.returncode == 0, done.stderr
+    assert "lost" not in done.stdout
     for measure in ("hz", "bw"):
-        done = verb(town, "topic", measure, "a/json", "--once")
-        assert done.returncode == 0, done.stderr
-        assert "lost" not in done.stdout
         output = json.loads(verb(town, "topic", measure, "a/js$*", "--once", "--json").stdout)
         assert (output["key"], output["lost"]) == ("a/json", None)
         assert {"p50", "p95", "p99", "jitter", "window"} <= set(output)
 
 
 def test_delay_reports_that_there_is_no_stamp(verb: Verb, town: Wire) -> None:
-    for ends in (("--timeout", "1"), ("--once",)):
-        done = verb(town, "topic", "delay", "a/json", *ends)
-        assert_one_line(
-            done, 1, "holozen topic delay: ", " messages have no header.stamp, and so no age"
-        )
+    done = verb(town, "topic", "delay", "a/json", "--once")
+    assert_one_line(
+        done, 1, "holozen topic delay: ", " messages have no header.stamp, and so no age"
+    )
     delay = town.start("topic", "delay", "a/json")
     delay.wait_for_line("messages have no header.stamp, and so no age")
     assert "no new messages" not in delay.err
@@ -185,13 +184,11 @@ def test_list_sees_foreign_nodes_if_it_listens(verb: Verb, town: Wire) -> None:
 
 
 def test_info_shows_what_a_foreign_node_sends(verb: Verb, town: Wire) -> None:
-    for flags in ((), ("-v",)):
-        done = verb(town, "topic", "info", "a/json", *flags)
-        assert done.stdout.splitlines()[1:] == [
-            "Publisher count: 1",
-            "  anonymous  DATA  application/json  DROP when full",
-            "Subscription count: 0",
-        ]
+    assert verb(town, "topic", "info", "a/json", "-v").stdout.splitlines()[1:] == [
+        "Publisher count: 1",
+        "  anonymous  DATA  application/json  DROP when full",
+        "Subscription count: 0",
+    ]
     assert verb(town, "topic", "info", "a/schema").stdout.startswith(
         "Type: geometry_msgs/msg/Twist\nPublisher count: 1\n"
     )

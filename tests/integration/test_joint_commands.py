@@ -9,7 +9,7 @@ from functools import partial
 import pytest
 
 from holozen import entities
-from holozen.messages import Header, JointState, Time
+from holozen.messages import Header, JointState, Time, TriggerReply, TriggerRequest
 from holozen.testing import Wire, wait_for
 from holozen.transport.pubsub import Publisher
 
@@ -41,14 +41,8 @@ class Rover:
     def rates(self) -> dict[str, float]:
         return self.newest()[1]
 
-    def turns_at(self, joint: str, rate: float) -> bool:
-        return self.rates()[joint] == pytest.approx(rate, abs=0.05)
-
     def is_at(self, joint: str, position: float) -> bool:
         return self.newest()[0][joint] == pytest.approx(position, abs=0.02)
-
-    def is_beyond(self, joint: str, position: float) -> bool:
-        return self.newest()[0][joint] > position
 
     def command(self, until: Callable[[], object], **values: dict[str, float]) -> None:
         """Send it again and again until something is true: command(..., velocity={"jFL": 1.0})."""
@@ -86,22 +80,10 @@ def rover(made: Rover) -> Rover:
     return made
 
 
-def test_each_joint_turns_at_its_commanded_rate(rover: Rover) -> None:
-    for joint in JOINTS:
-        for rate in (2.0, -2.0):
-            rover.command(partial(rover.turns_at, joint, rate), velocity={joint: rate})
-
-
 def test_each_joint_goes_to_its_commanded_position(rover: Rover) -> None:
     for joint in JOINTS:
         goal = rover.newest()[0][joint] + 1.0
         rover.command(partial(rover.is_at, joint, goal), position={joint: goal})
-
-
-def test_each_joint_yields_to_a_torque(rover: Rover) -> None:
-    for joint in JOINTS:
-        begin = rover.newest()[0][joint]
-        rover.command(partial(rover.is_beyond, joint, begin + 0.5), effort={joint: 1.5})
 
 
 def test_all_wheels_alike_drive_the_robot(rover: Rover) -> None:
@@ -226,11 +208,12 @@ def test_pub_reports_nothing_of_a_joint_command_that_is_obeyed(
 def test_pub_reports_that_a_stopped_robot_does_not_move_its_joints(
     verb: Verb, rover: Rover, town: Wire
 ) -> None:
-    assert verb(town, "stop").returncode == 0
+    bus = rover.robot.bus
+    bus.call("stop", TriggerRequest(), TriggerReply)
     try:
         done = verb(town, "topic", "pub", "joint_command", "{name: [jFL], velocity: [1]}", "--once")
     finally:
-        assert verb(town, "release").returncode == 0
+        bus.call("release", TriggerRequest(), TriggerReply)
     assert (done.returncode, "not obeyed: the robot is stopped by" in done.stderr) == (1, True)
 
 

@@ -5,7 +5,9 @@ from collections.abc import Iterator
 
 import pytest
 
+from holozen import entities
 from holozen.messages import TwistStamped
+from holozen.spawning import SpawnPose, spawn_file
 from holozen.testing import Terminal, Wire, wait_for
 
 from .conftest import Verb
@@ -66,21 +68,29 @@ def test_a_key_press_in_a_terminal_moves_the_robot(town: Wire, robot: Robot) -> 
         assert place(end)[1] == pytest.approx(place(start)[1], abs=1e-3)
 
 
-@pytest.mark.parametrize("flags", [("--mode", "latch"), ("--key-timeout", "3600")], ids=" ".join)
 def test_where_nothing_shows_that_a_terminal_hangs_a_key_counts_for_5_s(
-    town: Wire, robot: Robot, flags: tuple[str, ...]
+    town: Wire, robot: Robot
 ) -> None:
-    """This terminal answers no query."""
-    with start_teleop(town, *flags) as terminal:
-        terminal.wait_for_text("5 s in a terminal that does not answer")
-        after(robot, terminal, "i")
-        terminal.freeze()
-        robot.wait_for_stop_command()
-        robot.stands()
-        terminal.thaw()
-        terminal.wait_for_text(
-            "in a terminal that does not answer a key counts for 5 s: press it again"
-        )
+    """These terminals answer no query."""
+    spawn_file(town.bus(), URDF / "hb_bot.urdf.xacro", "Fred", SpawnPose(y=5.0))
+    fred = Robot(town.bus(), "Fred")
+    with (
+        start_teleop(town, "--mode", "latch") as latched,
+        start_teleop(town, "Fred", "--key-timeout", "3600") as held,
+    ):
+        both = ((latched, robot), (held, fred))
+        for terminal, driven in both:
+            terminal.wait_for_text("5 s in a terminal that does not answer")
+            after(driven, terminal, "i")
+            terminal.freeze()
+        for terminal, driven in both:
+            driven.wait_for_stop_command()
+            driven.stands()
+            terminal.thaw()
+            terminal.wait_for_text(
+                "in a terminal that does not answer a key counts for 5 s: press it again"
+            )
+    entities.delete(robot.bus, "Fred")
 
 
 @pytest.mark.parametrize("key", ["k", f"{ESCAPE}[15~"])

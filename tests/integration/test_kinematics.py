@@ -35,12 +35,11 @@ def drive(sim: LockStep, velocity: Planar) -> None:
 @pytest.mark.parametrize(
     ("velocity", "seconds"),
     [
-        ((0.5, 0.0, 0.0), 4.0),
         ((0.4, -0.3, 0.0), 4.0),
         ((0.3, 0.4, -0.8), 8.0),
         ((2.0, 1.0, 5.0), 2.0),
     ],
-    ids=["2 m forward", "2 m aslant", "arc aslant", "fast spiral"],
+    ids=["2 m aslant", "arc aslant", "fast spiral"],
 )
 def test_driving_two_metres_or_turning_ends_where_the_closed_form_predicts(
     sim: LockStep, velocity: Planar, seconds: float

@@ -19,7 +19,7 @@ from holozen.transport.services import MAX_REQUEST_BYTES, refusal
 from .conftest import foreign_config, start_sim
 from .robots import URDF, record
 
-LARGE = 200_000_000 if os.environ.get("HOLOZEN_LONG") == "1" else 100_000_000  # bytes
+LARGE = 200_000_000 if os.environ.get("HOLOZEN_LONG") == "1" else 60_000_000  # bytes
 NEAR = 30_000_000  # bytes
 
 
@@ -45,7 +45,7 @@ def memory(process: Process) -> int:
 
 
 @pytest.mark.parametrize("key", ["Rover/cmd_vel", "Rover/joint_command"])
-def test_a_sim_that_got_payloads_of_hundreds_of_mb_counts_them_and_is_as_small_as_before(
+def test_a_sim_that_got_huge_payloads_counts_them_and_is_as_small_as_before(
     sim: Process, driver: Bus, foreign: Bus, key: str
 ) -> None:
     odom, status = (
@@ -64,7 +64,7 @@ def test_a_sim_that_got_payloads_of_hundreds_of_mb_counts_them_and_is_as_small_a
     )
     wait_for(lambda: sender.matching_status.matching)
     payload = zenoh.ZBytes(bytes(LARGE))
-    for number in range(1, 4):
+    for number in (1, 2):
         sender.put(payload)
 
         def is_counted(wanted: int = counted + number) -> bool:
@@ -93,9 +93,7 @@ def test_nothing_is_received_through_shared_memory(sim: Process, town: Wire) -> 
         assert [line for line in maps.splitlines() if "/dev/shm/" in line] == []
 
 
-def test_a_request_of_hundreds_of_mb_is_refused_and_takes_no_memory(
-    sim: Process, foreign: Bus
-) -> None:
+def test_a_huge_request_is_refused_and_takes_no_memory(sim: Process, foreign: Bus) -> None:
     wait_for(foreign.served("spawn_entity"))
     before = memory(sim)
     (reply,) = foreign.ask("spawn_entity", 30.0, payload=zenoh.ZBytes(bytes(LARGE)))

@@ -29,8 +29,8 @@ rclpy.spin(node)
 WANTED = {"cells": [{"volts": 3.5, "state": 1}], "maker": "here", "on": [False, False]}
 
 
-@pytest.fixture(params=["json", "cdr"])
-def battery(request: pytest.FixtureRequest, wire: Wire, tmp_path: Path) -> Process:
+@pytest.fixture
+def battery(wire: Wire, tmp_path: Path) -> Process:
     """A process that publishes a type of a package that lies where no one else looks.
 
     Another one holds the meeting point: else the first verb might, which leaves it a moment later.
@@ -40,9 +40,7 @@ def battery(request: pytest.FixtureRequest, wire: Wire, tmp_path: Path) -> Proce
         path = tmp_path / "package" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
-    return wire.start(
-        "run", "--wire", request.param, str(tmp_path / "package" / "scripts" / "battery.py")
-    )
+    return wire.start("run", "--wire", "cdr", str(tmp_path / "package/scripts/battery.py"))
 
 
 def shown(wire: Wire, name: str) -> tuple[str, list[str]]:

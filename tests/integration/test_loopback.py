@@ -65,21 +65,11 @@ def scouts(host: Host) -> set[str]:
     return {row.partition("%")[2] or "*" for row in rows}
 
 
-@pytest.fixture
-def up(network: Host) -> Iterator[Process]:
-    """All of holozen there, without a terminal. Its sim is on the wire, so there is a listener at
-    the port.
-    """
-    with Process(network.inside(*command("up"))) as up:
-        up.wait_for_line("listens on cmd_vel")
-        yield up
-
-
-def test_nothing_listens_beyond_loopback_and_multicast_is_joined_there_alone(network: Host) -> None:
-    with (
-        Process(network.inside(*command("up"))) as up,
-        Terminal(network.inside(*command("teleop"))) as teleop,
-    ):
+def test_all_of_up_is_on_loopback_alone_where_the_commands_of_the_readme_work_as_they_stand(
+    network: Host,
+) -> None:
+    up = network.start(*command("up"))
+    with Terminal(network.inside(*command("teleop"))) as teleop:
         teleop.wait_for_text("controller@")
         listeners = [
             (address, port) for address, port, state in sockets(network, "tcp") if state == LISTENS
@@ -90,17 +80,11 @@ def test_nothing_listens_beyond_loopback_and_multicast_is_joined_there_alone(net
             assert sockets(network, name) == []
         wait_for(lambda: scouts(network) == {"lo"}, what="verbs to have bound theirs")
         assert groups(network) == {"lo"}
-        assert (
-            network.run(*command("topic", "echo", "odom", "--once", "--timeout", "20")).returncode
-            == 0
-        )
-        assert {address for address, *_ in sockets(network, "tcp")} == {LOOPBACK}, (
-            "those of connections too"
-        )
-        assert up.returncode is None
-
-
-def test_the_commands_of_the_readme_work_as_they_stand(network: Host, up: Process) -> None:
+    echo = ("topic", "echo", "odom", "--once", "--timeout", "20", "--json")
+    assert json.loads(network.run(*command(*echo)).stdout)["child_frame_id"]
+    assert {address for address, *_ in sockets(network, "tcp")} == {LOOPBACK}, (
+        "those of connections too"
+    )
     with Process(
         network.inside(ZENOH, *CLIENT, "subscribe", "-k", "odom", "--decoder", "json"),
         env={"PYTHONUNBUFFERED": "1"},
@@ -108,9 +92,6 @@ def test_the_commands_of_the_readme_work_as_they_stand(network: Host, up: Proces
         subscriber.wait_for_line("footprint_link")
     kind = "Type: geometry_msgs/msg/Twist\n"
     wait_for(lambda: network.run(*command("topic", "info", "cmd_vel")).stdout.startswith(kind))
-    assert json.loads(network.run(*command("topic", "echo", "odom", "--once", "--json")).stdout)[
-        "child_frame_id"
-    ]
 
     def taken() -> bool:
         put = network.run(

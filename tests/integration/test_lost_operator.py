@@ -5,8 +5,8 @@ The robots here have a watchdog of a minute, or none at all: what stops them wit
 nothing else.
 """
 
-import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
@@ -15,20 +15,19 @@ from holozen.messages import Pose
 from holozen.robot.files.xacro import expand_xacro
 from holozen.testing import Process, Wire, wait_for
 
-from .conftest import start_sim
+from .conftest import Verb, in_time, start_sim
 from .robots import URDF, Robot, moves, speeds
 
 TAG = "<commandTopic>"
 WATCHDOGS = {"Slow": "60", "Never": "-1"}  # s
 
 DRIVER = """
-import sys, time
+import time
 from holozen.bus import Bus
 from holozen.transport.connection import Connection
 from holozen.messages import Twist
-endpoint, key, dead_man = sys.argv[1:]
-with Bus("driver", Connection(connect=(endpoint,), listen=())) as bus:
-    commands = bus.publisher(key, Twist, dead_man=bool(dead_man))
+with Bus("driver", Connection(connect=({endpoint!r},), listen=())) as bus:
+    commands = bus.publisher({key!r}, Twist)
     print(bus.source, flush=True)
     while True:
         commands.put(Twist.planar(0.4))
@@ -59,46 +58,50 @@ def robot(robots: dict[str, Robot], request: pytest.FixtureRequest) -> Iterator[
     robot.stop()
 
 
-def driver(wire: Wire, robot: Robot, dead_man: bool = True) -> Process:
-    """A program that drives the robot, and does so by now."""
-    process = Process(
-        [
-            sys.executable,
-            "-c",
-            DRIVER,
-            wire.endpoint,
-            f"{robot.name}/cmd_vel",
-            "yes" if dead_man else "",
-        ]
-    )
-    robot.odom.next(lambda odom: moves(odom, 0.4, 0, 0))
-    assert robot.status().obeyed == process.wait_for_line("driver@")
-    return process
+@pytest.fixture
+def drive(town: Wire, tmp_path: Path) -> Callable[[Robot], Process]:
+    """Starts a program that drives a robot, and does so by then."""
+
+    def drive(robot: Robot) -> Process:
+        script = tmp_path / "driver.py"
+        script.write_text(DRIVER.format(endpoint=town.endpoint, key=f"{robot.name}/cmd_vel"))
+        process = town.start("run", str(script))
+        robot.odom.next(lambda odom: moves(odom, 0.4, 0, 0))
+        assert robot.status().obeyed == process.wait_for_line("driver@")
+        return process
+
+    return drive
 
 
 def test_a_driver_that_is_killed_leaves_a_robot_that_stands_and_obeys_the_next_one(
-    town: Wire, robot: Robot
+    robot: Robot, drive: Callable[[Robot], Process]
 ) -> None:
     for _ in range(2):
-        with driver(town, robot) as process:
-            process.kill()
-            robot.stands()
+        drive(robot).kill()
+        robot.stands()
 
 
-def test_what_is_no_node_keeps_the_robots_own_watchdog(town: Wire, robot: Robot) -> None:
+def test_what_is_no_node_keeps_the_robots_own_watchdog(
+    verb: Verb, town: Wire, robot: Robot
+) -> None:
     """`topic pub --once` and a plain `zenoh put` are gone as soon as they have spoken."""
-    with driver(town, robot, dead_man=False) as process:
-        process.kill()
-        robot.pass_time(1.0)
-        assert moves(robot.newest(), 0.4, 0, 0)
+    forward = ("topic", "pub", f"{robot.name}/cmd_vel", "linear: {x: 0.4}", "--once")
+    done = in_time(lambda: verb(town, *forward))
+    assert done.returncode == 0, done.stderr
+    robot.odom.next(lambda odom: moves(odom, 0.4, 0, 0))
+    robot.pass_time(1.0)
+    assert moves(robot.newest(), 0.4, 0, 0)
 
 
 def test_a_foreign_node_that_is_killed_stops_no_robot(
-    town: Wire, robot: Robot, robots: dict[str, Robot]
+    robots: dict[str, Robot], drive: Callable[[Robot], Process]
 ) -> None:
-    other = next(other for other in robots.values() if other is not robot)
+    other, robot = robots.values()
+    other.resume()
+    robot.resume()
     graph = robot.bus.graph()
-    with driver(town, other) as process, driver(town, robot):
+    process = drive(other)
+    with drive(robot):
         odoms, source = robot.odom.from_now(), other.status().obeyed
         process.kill()
         wait_for(

@@ -32,12 +32,12 @@ def sim(town: Wire) -> None:
 
 @pytest.fixture(scope="module")
 def crowd(town: Wire, sim: None) -> Iterator[list[Bus]]:
-    """Fifty nodes; clients of the sim, for as many peers would talk to each other most of the
+    """Twenty nodes; clients of the sim, for as many peers would talk to each other most of the
     time.
     """
     at_the_sim = Connection(mode="client", connect=(town.endpoint,))
     with ExitStack() as ends:
-        crowd = [ends.enter_context(Bus(f"caller{number}", at_the_sim)) for number in range(50)]
+        crowd = [ends.enter_context(Bus(f"caller{number}", at_the_sim)) for number in range(20)]
         for bus in crowd:
             wait_for(bus.served("spawn_entity"))
         yield crowd
@@ -65,11 +65,8 @@ def outcome(replies: list[Sample | bytes]) -> str:
     return "busy" if isinstance(reply, bytes) and refusal(reply).fields.get("busy") else "answered"
 
 
-@pytest.mark.parametrize("callers", [1, 50])
-def test_every_request_of_a_thousand_is_answered(
-    robot: Robot, crowd: list[Bus], callers: int
-) -> None:
-    assert outcomes(ask(crowd[:callers], "get_entities")) <= {"answered", "busy"}
+def test_every_request_of_a_thousand_is_answered(robot: Robot, crowd: list[Bus]) -> None:
+    assert outcomes(ask(crowd, "get_entities")) <= {"answered", "busy"}
 
 
 def test_a_flood_of_requests_holds_up_no_spawn_and_no_delete_of_others(

@@ -149,19 +149,14 @@ def test_a_second_sim_only_joins_with_named_robots_and_then_both_are_one_world_t
 ) -> None:
     wire.start("router").wait_for_line("listens at")
     first = start_sim(wire, "--robot", f"{BOT}=Fred")
+    join = "holozen sim --join --robot FILE=NAME"
     for words, why in [
-        (
-            [],
-            "end it, choose another --domain, or join it with named robots: holozen sim --join "
-            "--robot FILE=NAME",
-        ),
-        (["--robot", f"{BOT}=Ann"], "end it, choose another --domain, or join it"),
-        (["--join"], "name the robots: holozen sim --join --robot FILE=NAME"),
-        (["--join", "--robot", f"{BOT}=Ann", "--robot", str(BOT)], "name the robots: "),
+        ([], f"end it, choose another --domain, or join it with named robots: {join}"),
+        (["--join", "--robot", f"{BOT}=Ann", "--robot", str(BOT)], f"name the robots: {join}"),
     ]:
         # A new Python: without --join a sim learns of others while its engine loads, and a forked
         # one has loaded it.
-        done = run(command("sim", *words, *wire.flags), is_new=True)
+        done = run(command("sim", *words, *wire.flags), is_new=not words)
         assert_one_line(done, 1, "sim: sim@", f" simulates here already; {why}")
     with Proxy(wire.port) as link:  # a slow one: what it joins is discovered late
         link.set(delay=0.2)

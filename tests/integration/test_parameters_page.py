@@ -33,7 +33,7 @@ def _row(node: str, one: r.ParameterDescriptor) -> str:
 
 
 def test_the_table_is_current_and_the_call_of_the_page_works(verb: Verb, wire: Wire) -> None:
-    wire.start("sim").wait_for_line("listens on")
+    wire.start("sim", "--rtf", "0.2").wait_for_line("listens on")
     wire.start("controller").wait_for_line("waiting for")
     wire.start("pose-service").wait_for_line("goals")
     bus = wire.bus()

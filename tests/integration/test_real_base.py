@@ -74,7 +74,7 @@ same time.
 
 
 class Kiwi:
-    """The base, its servos, and a wire."""
+    """The base, once it is started, its servos, and a wire."""
 
     def __init__(
         self,
@@ -87,7 +87,6 @@ class Kiwi:
         self.servos = Process([sys.executable, *servos], env={"PYTHONPATH": str(FOLDER)})
         self.port = self.servos.wait_for_line("/dev/")
         self.command = [sys.executable, str(FOLDER / "lekiwi.py"), self.port, *self.flags]
-        self.start()
 
     def start(self) -> None:
         self.base = Process(self.command)
@@ -135,6 +134,7 @@ def said(base: Process) -> list[str]:
 def kiwi(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Kiwi]:
     with Wire() as wire:
         kiwi = Kiwi(wire, tmp_path_factory.mktemp("state"))
+        kiwi.start()
         yield kiwi
         kiwi.close()
 
@@ -145,11 +145,19 @@ def probe(kiwi: Kiwi) -> Probe:
 
 
 @pytest.fixture
-def own(wire: Wire, tmp_path: Path) -> Iterator[Kiwi]:
-    """A base of the test's own, which it may end."""
+def unstarted(wire: Wire, tmp_path: Path) -> Iterator[Kiwi]:
+    """A base that the test starts."""
     kiwi = Kiwi(wire, tmp_path)
     yield kiwi
-    kiwi.close()
+    kiwi.servos.close()
+
+
+@pytest.fixture
+def own(unstarted: Kiwi) -> Iterator[Kiwi]:
+    """A base of the test's own, which it may end."""
+    unstarted.start()
+    yield unstarted
+    unstarted.base.close()
 
 
 @pytest.mark.parametrize("promise", PROMISES, ids=name)
@@ -185,13 +193,15 @@ def test_its_wheels_turn_as_those_of_an_omni_base_and_its_odometry_says_so(
     probe.rest("after a zero")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGSTOP])
-def test_its_wheels_stop_whatever_ends_or_holds_it(number: signal.Signals, own: Kiwi) -> None:
-    own.drive(own.wire.bus().publisher("cmd_vel", Twist))
-    own.base.signal(number)
-    wait_for(lambda: own.speeds() == STANDS, what="the wheels to stop")
-    if number in (signal.SIGINT, signal.SIGTERM):
-        assert own.base.wait() == 0
+def test_its_wheels_stop_whatever_ends_or_holds_it(own: Kiwi) -> None:
+    commands = own.wire.bus().publisher("cmd_vel", Twist)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGSTOP):
+        own.drive(commands)
+        own.base.signal(number)
+        wait_for(lambda: own.speeds() == STANDS, what=f"the wheels to stop after {number.name}")
+        if number != signal.SIGSTOP:
+            assert own.base.wait() == 0
+            own.kill_and_start()
     own.servos.signal(0)  # which still run
 
 
@@ -199,6 +209,7 @@ def test_its_wheels_stop_when_it_is_killed_and_the_first_stop_gets_lost(
     wire: Wire, tmp_path: Path
 ) -> None:
     kiwi = Kiwi(wire, tmp_path, ["-c", LOSSY])
+    kiwi.start()
     try:
         kiwi.drive(wire.bus().publisher("cmd_vel", Twist))
         kiwi.base.kill()
@@ -207,20 +218,25 @@ def test_its_wheels_stop_when_it_is_killed_and_the_first_stop_gets_lost(
         kiwi.close()
 
 
-@pytest.mark.parametrize("end", ["\x1a", "\x1c", "kill -STOP %1\r", "kill -9 %1\r"])
-def test_its_wheels_stop_when_its_whole_job_is_suspended_or_killed(end: str, own: Kiwi) -> None:
-    own.base.terminate()
-    job = shlex.join(own.command)
+def test_its_wheels_stop_when_its_whole_job_is_suspended_or_killed(unstarted: Kiwi) -> None:
+    commands = unstarted.wire.bus().publisher("cmd_vel", Twist)
+    for end in ("\x1a", "\x1c", "kill -STOP %1\r", "kill -9 %1\r"):
+        stops_when_its_job_ends(end, unstarted, commands)
+
+
+def stops_when_its_job_ends(end: str, kiwi: Kiwi, commands: Any) -> None:
+    """Start it as a job of a shell, and end or suspend that by what is typed there."""
+    job = shlex.join(kiwi.command)
     with Terminal(SHELL, env={"PS1": "$ "}, size=(200, 32)) as shell:
         shell.type(f"{job} {'&' if end.startswith('kill') else ''}\r")
         wait_for(lambda: "drives the servos" in shell.raw)
-        own.drive(own.wire.bus().publisher("cmd_vel", Twist))
+        kiwi.drive(commands)
 
         def is_hit() -> bool:
             with contextlib.suppress(OSError):  # one has just ended
                 states = [
                     Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][0]
-                    for pid in own.processes()
+                    for pid in kiwi.processes()
                 ]
                 return len(states) < 2 or "T" in states
             return True
@@ -228,40 +244,41 @@ def test_its_wheels_stop_when_its_whole_job_is_suspended_or_killed(end: str, own
         shell.type(end)
         wait_for(is_hit, what=lambda: f"the signal to arrive; the shell shows {shell.raw}")
         wait_for(
-            lambda: own.speeds() == STANDS,
+            lambda: kiwi.speeds() == STANDS,
             what=lambda: f"the wheels to stop; the shell shows {shell.raw}",
         )
         shell.type("kill -9 %1\r")
-        wait_for(lambda: not own.processes(), what=lambda: f"{own.processes()} to end")
+        wait_for(lambda: not kiwi.processes(), what=lambda: f"{kiwi.processes()} to end")
+        shell.process.kill()  # it ignores a SIGTERM
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-def test_it_ends_in_one_line_without_its_guard_which_no_other_signal_ends(
-    number: signal.Signals, own: Kiwi
-) -> None:
-    own.drive(own.wire.bus().publisher("cmd_vel", Twist))
-    (guard,) = set(own.processes()) - {own.base.pid}
+def test_it_ends_in_one_line_without_its_guard_which_no_other_signal_ends(own: Kiwi) -> None:
+    commands = own.wire.bus().publisher("cmd_vel", Twist)
+    guard = guard_of_one_that_drives(own, commands)
     for other in (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         os.kill(guard, other)
-    if number == signal.SIGKILL:
-        own.base.kill()
-        wait_for(
-            lambda: own.speeds() == STANDS, what="the wheels to stop by the guard that lives on"
-        )
-        wait_for(lambda: not own.processes(), what="the guard to end")
+    own.base.kill()
+    wait_for(lambda: own.speeds() == STANDS, what="the wheels to stop by the guard that lives on")
+    wait_for(lambda: not own.processes(), what="the guard to end")
+    for number in (signal.SIGKILL, signal.SIGSTOP):
         own.kill_and_start()
-        own.drive(own.wire.bus("again").publisher("cmd_vel", Twist))
-        (guard,) = set(own.processes()) - {own.base.pid}
-    os.kill(guard, number)
-    assert own.base.wait() == 1
-    assert said(own.base)[1:] == [
-        f"lekiwi: the guard that stops the wheels, process {guard}, has ended or hangs; start "
-        "lekiwi.py again"
-    ]
-    wait_for(lambda: own.speeds() == STANDS, what="the wheels to stop")
-    if number == signal.SIGSTOP:
-        os.kill(guard, signal.SIGCONT)
-        wait_for(lambda: not own.processes(), what="the guard to end once it goes on")
+        guard = guard_of_one_that_drives(own, commands)
+        os.kill(guard, number)
+        assert own.base.wait() == 1
+        assert said(own.base)[1:] == [
+            f"lekiwi: the guard that stops the wheels, process {guard}, has ended or hangs; start "
+            "lekiwi.py again"
+        ]
+        wait_for(lambda: own.speeds() == STANDS, what="the wheels to stop")
+    os.kill(guard, signal.SIGCONT)
+    wait_for(lambda: not own.processes(), what="the guard to end once it goes on")
+
+
+def guard_of_one_that_drives(own: Kiwi, commands: Any) -> int:
+    """Drive, and the process id of the guard."""
+    own.drive(commands)
+    (guard,) = set(own.processes()) - {own.base.pid}
+    return guard
 
 
 @pytest.mark.parametrize("kind", ["patterns", "deep"])
@@ -272,7 +289,10 @@ def test_whatever_another_peer_sends_a_stop_reaches_the_wheels(
     chunks end nothing.
     """
     driver, place = str(FAULTS / "driver.py"), own.wire.endpoint.partition("/")[2]
-    for _ in range(trials(1, 5)):
+    for number in range(trials(1, 5)):
+        if number:
+            own.kill_and_start()
+            assert own.wire.run("release").returncode == 0
         # A driver that went on during the stop would have to let go before it drives again.
         with Process([sys.executable, driver, own.wire.endpoint]):
             wait_for(
@@ -289,8 +309,6 @@ def test_whatever_another_peer_sends_a_stop_reaches_the_wheels(
                 assert stop.returncode == 0, stop
                 assert stopped(stop.stdout) == ["lekiwi"]
                 assert own.base.returncode is None
-        own.kill_and_start()
-        assert own.wire.run("release").returncode == 0
 
 
 def test_a_base_that_was_stopped_and_killed_is_still_stopped_when_it_is_started_again(
@@ -322,11 +340,11 @@ def test_a_base_that_was_stopped_and_killed_is_still_stopped_when_it_is_started_
     own.drive(commands)
 
 
-def test_a_second_base_of_the_same_name_is_refused_and_the_first_is_named(own: Kiwi) -> None:
+def test_a_second_base_of_the_same_name_is_refused_and_the_first_is_named(kiwi: Kiwi) -> None:
     with Process([sys.executable, str(FOLDER / "simulated_servos.py")]) as servos:
         port = servos.wait_for_line("/dev/")
         start = [sys.executable, str(FOLDER / "lekiwi.py"), port]
-        with Process([*start, *own.flags]) as second:
+        with Process([*start, *kiwi.flags]) as second:
             assert second.wait() == 1
             (line,) = second.err.splitlines()
             assert re.fullmatch(
@@ -334,9 +352,9 @@ def test_a_second_base_of_the_same_name_is_refused_and_the_first_is_named(own: K
                 r"one another name",
                 line,
             )
-        with Process([*start, "Kiwi", *own.flags]) as other:
+        with Process([*start, "Kiwi", *kiwi.flags]) as other:
             other.wait_for_line("drives the servos")
-    assert own.base.returncode is None
+    assert kiwi.base.returncode is None
 
 
 def test_of_two_bases_that_did_not_discover_each_other_in_time_one_ends(

@@ -2,9 +2,7 @@
 
 import json
 import re
-import subprocess
 from collections.abc import Iterator
-from importlib.metadata import version
 
 import pytest
 
@@ -137,61 +135,36 @@ def test_node_list_names_the_running_nodes(verb: Verb, town: Wire) -> None:
     wait_for(lambda: nodes() == ["pose_service", "sim"])
 
 
-def test_clients_meet_through_a_router(wire: Wire) -> None:
-    with Process(command("router", "--listen", wire.endpoint)) as router:
-        router.wait_for_line(f"router: listens at {wire.endpoint}")
-        client = ["--mode", "client", "--connect", wire.endpoint]
-        with (
-            Process(command("sim", *client)) as sim,
-            Process(command("pose-service", *client)) as service,
-        ):
-            sim.wait_for_line("listens on")
-            service.wait_for_line("goals")
-            echo = command("topic", "echo", "odom", "--once", "--timeout", "20", *client)
+def test_clients_wait_for_their_router_meet_through_it_and_find_it_again(wire: Wire) -> None:
+    client = ["--mode", "client", "--connect", wire.endpoint]
+    listens = command("router", "--listen", wire.endpoint)
+    with (
+        Process(command("sim", *client)) as sim,
+        Process(command("pose-service", *client)) as service,
+        Process(command("pose-service", *client)) as ends,
+    ):
+        sim.wait_for_line(f"waiting for a Zenoh router at {wire.endpoint}")
+        ends.wait_for_line("waiting for a Zenoh router")
+        ends.terminate()
+        echo = command("topic", "echo", "odom", "--once", "--timeout", "20", *client)
+        with Process(listens) as router:
+            sim.wait_for_line("listens on cmd_vel")
+            assert run(echo).returncode == 0
+            router.kill()
+        with Process(listens) as router:
+            router.wait_for_line(f"router: listens at {wire.endpoint}")
             assert run(echo).returncode == 0
             nodes = ["pose_service", "router", "sim"]
             comes_to(nodes, lambda: run(command("node", "list", *client)).stdout.split())
             assert service.terminate() == 0
             assert sim.terminate() == 0
-        assert router.terminate() == 0
-        assert "Traceback" not in sim.err + service.err + router.err
-
-
-def test_clients_wait_for_their_router_and_find_it_again(wire: Wire) -> None:
-    client = ["--mode", "client", "--connect", wire.endpoint]
-    with Process(command("sim", *client)) as sim:
-        sim.wait_for_line(f"waiting for a Zenoh router at {wire.endpoint}")
-        for _ in range(2):
-            with Process(command("router", "--listen", wire.endpoint)) as router:
-                router.wait_for_line("listens at")
-                sim.wait_for_line("listens on cmd_vel")
-                echo = command("topic", "echo", "odom", "--once", "--timeout", "20", *client)
-                assert run(echo).returncode == 0
-                router.kill()
-        assert sim.terminate() == 0
-
-
-def test_a_client_that_waits_for_its_router_ends_on_a_signal(wire: Wire) -> None:
-    with Process(
-        command("pose-service", "--mode", "client", "--connect", wire.endpoint)
-    ) as service:
-        service.wait_for_line("waiting for a Zenoh router")
-        service.terminate()
-        assert "Traceback" not in service.err
+            assert router.terminate() == 0
+        assert "Traceback" not in sim.err + service.err + ends.err + router.err
 
 
 def test_a_router_whose_port_is_taken_reports_it(town: Wire) -> None:
-    done = subprocess.run(
-        command("router", "--listen", town.endpoint), capture_output=True, text=True, timeout=30
-    )
+    done = run(command("router", "--listen", town.endpoint))
     assert_one_line(done, 1, "holozen router: cannot open Zenoh: ", str(town.port))
-
-
-def test_the_version_is_that_of_the_package() -> None:
-    assert (
-        subprocess.run(command("--version"), capture_output=True, text=True).stdout
-        == f"{version('holozen')}\n"
-    )
 
 
 def test_service_type_find_and_info(verb: Verb, town: Wire) -> None:

@@ -135,7 +135,7 @@ def slows(robot: Robot, limit: float = SLOW) -> Callable[[], object]:
     return lambda: max(map(abs, speeds(robot.newest()))) < limit
 
 
-@pytest.mark.parametrize("name", ["hb_bot.urdf.xacro", "rover.urdf.xacro", "wheely_boi.xacro"])
+@pytest.mark.parametrize("name", ["rover.urdf.xacro", "wheely_boi.xacro"])
 def test_whatever_is_commanded_a_stopped_robot_stands(
     verb: Verb, town: Wire, sim: Process, flood: Flood, name: str
 ) -> None:
@@ -150,7 +150,8 @@ def test_whatever_is_commanded_a_stopped_robot_stands(
         robot.odom.next(lambda odom: speeds(odom)[0] > 0.3)
         assert stopped(verb(town, "stop", "Rob").stdout) == ["Rob"]
         wait_for(slows(robot), what="it to stand")
-        robot.pass_time(1.0)  # what balances sways for a moment
+        if name.startswith("wheely"):
+            robot.pass_time(1.0)  # what balances sways for a moment
         odoms = stands_for(robot, 0.5)
         assert abs(odoms[-1].pose.pose.orientation.x) < 0.1
         status = robot.status_when(lambda status: status.refused.get("stopped", 0) > 100)

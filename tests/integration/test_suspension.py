@@ -44,6 +44,7 @@ def shell() -> Iterator[Terminal]:
     with Terminal(["bash", "--norc", "-i"], env={"PS1": "$ "}) as shell:
         shell.wait_for_text("$")
         yield shell
+        shell.hang_up()
 
 
 def test_a_suspended_launch_drives_no_robot_and_goes_on_with_its_job(
@@ -76,7 +77,9 @@ def test_a_suspended_launch_drives_no_robot_and_goes_on_with_its_job(
     assert rests(robot.newest())
 
 
-def test_ctrl_z_in_the_teleop_of_up_suspends_all_of_it(wire: Wire, shell: Terminal) -> None:
+def test_ctrl_z_and_a_signal_to_up_alone_suspend_all_of_it_and_killed_then_it_leaves_none(
+    wire: Wire, shell: Terminal
+) -> None:
     shell.type(" ".join(command("up", *wire.flags)) + "\r")
     robot = Robot(wire.bus())
     robot.odom.next(lambda odom: not rests(odom))
@@ -92,17 +95,6 @@ def test_ctrl_z_in_the_teleop_of_up_suspends_all_of_it(wire: Wire, shell: Termin
         lambda: "T" not in {state_of(pid) for pid in parts.values()}, what="all parts to go on"
     )
     shell.wait_for_text("controller@")
-    shell.type("\x03")
-    wait_for(lambda: parts_at(wire) == {})
-
-
-def test_a_signal_to_up_alone_suspends_its_parts_and_killed_then_it_leaves_none(
-    wire: Wire, shell: Terminal
-) -> None:
-    shell.type(" ".join(command("up", *wire.flags)) + " < /dev/null\r")
-    robot = Robot(wire.bus())
-    robot.odom.next(lambda odom: not rests(odom))
-    parts = parts_at(wire)
     os.kill(parts["up"], signal.SIGTSTP)
     wait_for(
         lambda: {state_of(pid) for pid in parts.values()} == {"T"}, what="all parts to be suspended"

@@ -4,8 +4,6 @@ import signal
 import sys
 from pathlib import Path
 
-import pytest
-
 from holozen.testing import Terminal, Wire, wait_for
 
 from .conftest import deaf, start_sim
@@ -15,7 +13,7 @@ from .robots import Robot, moves, planar
 ROOT = Path(__file__).parents[2]
 DRIVES_ON = ("--mode", "latch")
 
-# A teleop with one part broken while it drives. BREAK is the statement that breaks it.
+# A teleop whose next picture fails while it drives.
 BROKEN = """
 import sys
 sys.path.insert(0, {root!r})
@@ -27,7 +25,7 @@ take = session.Session.take
 def take_and_break(self, event, now):
     done = take(self, event, now)
     if isinstance(event, Key):
-        {statement}
+        telemetry.Telemetry.state = breaks
     return done
 session.Session.take = take_and_break
 sys.exit(teleop.main(sys.argv[1:]))
@@ -58,27 +56,14 @@ def test_without_a_terminal_it_reports_that_in_one_line(town: Wire) -> None:
     assert_one_line(town.run("teleop"), 2, "needs a terminal")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP], ids=lambda n: n.name)
-def test_a_signal_stops_the_robot_and_leaves_the_terminal_tidy(
-    town: Wire, robot: Robot, number: int
-) -> None:
+def test_a_signal_stops_the_robot_and_leaves_the_terminal_tidy(town: Wire, robot: Robot) -> None:
     with driving(robot, town.terminal("teleop", *DRIVES_ON)) as terminal:
-        terminal.process.signal(number)
+        terminal.process.signal(signal.SIGHUP)
         assert terminal.process.wait() == 0
         robot.stands()
         robot.wait_for_stop_command()
         assert_tidy(terminal)
         assert "Traceback" not in terminal.raw
-
-
-def test_a_signal_to_an_idle_teleop_publishes_nothing(town: Wire, robot: Robot) -> None:
-    with town.terminal("teleop") as terminal:
-        terminal.wait_for_text("listening")
-        commands = robot.commands.from_now()
-        assert terminal.process.terminate() == 0
-        robot.newest()
-        assert commands.messages() == []
-        assert_tidy(terminal)
 
 
 def test_ctrl_c_stops_the_robot_and_quits(town: Wire, robot: Robot) -> None:
@@ -100,14 +85,17 @@ def test_ctrl_c_that_was_typed_during_a_pause_quits(town: Wire, robot: Robot) ->
         assert_tidy(terminal)
 
 
-def test_a_size_that_changes_after_the_terminal_was_given_back_changes_nothing(
+def test_signals_to_an_idle_teleop_publish_nothing_nor_does_a_size_that_changes_without_terminal(
     town: Wire, robot: Robot
 ) -> None:
     with town.terminal("teleop") as terminal:
         terminal.wait_for_text("listening")
+        commands = robot.commands.from_now()
         for number in (signal.SIGTSTP, signal.SIGWINCH, signal.SIGCONT, signal.SIGTERM):
             terminal.process.signal(number)
         assert terminal.process.wait() == 0
+        robot.newest()
+        assert commands.messages() == []
         assert_tidy(terminal)
 
 
@@ -119,20 +107,12 @@ def test_a_terminal_that_is_closed_stops_the_robot(town: Wire, robot: Robot) -> 
         robot.wait_for_stop_command()
 
 
-@pytest.mark.parametrize(
-    "statement",
-    [
-        "telemetry.Telemetry.state = breaks",  # the next picture fails
-        "session.Session.tick = breaks",
-        "breaks()",
-    ],
-    ids=["picture", "tick", "key"],
-)
 def test_an_exception_stops_the_robot_and_is_one_error_line(
-    town: Wire, robot: Robot, tmp_path: Path, statement: str
+    town: Wire, robot: Robot, tmp_path: Path
 ) -> None:
+    """Of each other part of the teleop: tests/terminals/test_ways_to_die.py."""
     script = tmp_path / "broken_teleop.py"
-    script.write_text(BROKEN.format(root=str(ROOT), statement=statement))
+    script.write_text(BROKEN.format(root=str(ROOT)))
     with Terminal([sys.executable, str(script), *DRIVES_ON, *town.flags]) as terminal:
         terminal.wait_for_text("listening")
         robot.knows("teleop")
@@ -160,10 +140,18 @@ def test_the_stop_arrives_though_a_subscriber_of_cmd_vel_reads_nothing(
         assert "Traceback" not in terminal.raw
 
 
-def test_a_teleop_whose_sim_is_gone_quits_all_the_same(wire: Wire) -> None:
+def test_a_teleop_alone_reports_that_and_quits_all_the_same_where_its_sim_is_gone(
+    wire: Wire,
+) -> None:
+    terminal = wire.terminal("teleop", *DRIVES_ON)
+    screen = terminal.wait_for_text("NO ODOM")
+    assert "NO SUBSCRIBER on cmd_vel" in screen
+    terminal.hold_until("i", lambda: "+0.500" in terminal.screen())
     sim = start_sim(wire)
+    terminal.wait_for_text("listening sim")
+    wait_for(lambda: "NO ODOM" not in terminal.screen())
     robot = Robot(wire.bus())
-    terminal = driving(robot, wire.terminal("teleop", *DRIVES_ON))
+    driving(robot, terminal)
     sim.kill()
     terminal.wait_for_text("ODOM IS STALE")
     assert terminal.process.terminate() == 0
@@ -176,16 +164,6 @@ def test_a_teleop_whose_sim_is_gone_quits_all_the_same(wire: Wire) -> None:
     )
     robot.wait_for_stop_command()
     assert_tidy(terminal)
-
-
-def test_a_teleop_alone_reports_that_it_has_no_subscriber(wire: Wire) -> None:
-    terminal = wire.terminal("teleop", *DRIVES_ON)
-    screen = terminal.wait_for_text("NO ODOM")
-    assert "NO SUBSCRIBER on cmd_vel" in screen
-    terminal.hold_until("i", lambda: "+0.500" in terminal.screen())
-    start_sim(wire)
-    terminal.wait_for_text("listening sim")
-    wait_for(lambda: "NO ODOM" not in terminal.screen())
 
 
 def test_in_a_dumb_terminal_it_writes_lines_and_moves_no_cursor(town: Wire, robot: Robot) -> None:

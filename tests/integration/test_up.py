@@ -54,17 +54,6 @@ def test_without_a_terminal_the_controller_drives_the_square_and_the_page_of_a_v
     assert "Traceback" not in up.err
 
 
-def test_a_signal_ends_all_of_it_with_a_stop_of_the_robot(wire: Wire) -> None:
-    up = wire.start("up")
-    robot = Robot(wire.bus())
-    driven(robot)
-    assert set(all_run(wire, PARTS)) == {"up", *PARTS}
-    assert up.terminate(AT_MOST) == 0
-    assert parts_at(wire) == {}
-    robot.wait_for_stop_command()
-    assert "Traceback" not in up.err
-
-
 READ_ONLY = 'mount -o remount,bind,ro / && exec "$@"'
 
 
@@ -234,7 +223,9 @@ def test_a_killed_sim_is_reported_and_one_started_by_hand_joins_the_others(wire:
     up.wait_for_line("controller: continues")
 
 
-def test_a_part_that_dies_is_started_again_and_moves_no_robot(wire: Wire) -> None:
+def test_a_part_that_dies_is_started_again_and_moves_no_robot_and_a_signal_ends_all_with_a_stop_of_it(  # noqa: E501
+    wire: Wire,
+) -> None:
     up = wire.start("up")
     robot = Robot(wire.bus())
     for part, then, holds in (
@@ -271,8 +262,11 @@ def test_a_part_that_dies_is_started_again_and_moves_no_robot(wire: Wire) -> Non
             assert wire.run("release").returncode == 0
         wait_for(partial(resumed, robot))
     driven(robot)
-    assert up.interrupt(AT_MOST) == 0
+    assert set(all_run(wire, PARTS)) == {"up", *PARTS}
+    assert up.terminate(AT_MOST) == 0
     assert parts_at(wire) == {}
+    robot.wait_for_stop_command()
+    assert "Traceback" not in up.err
 
 
 def resumed(robot: Robot) -> bool:

@@ -34,13 +34,6 @@ def installed() -> None:
         pytest.skip("needs zenoh-cli; run: scripts/venv requirements-dev.lock")
 
 
-def test_it_subscribes_to_odom_and_shows_readable_text(town: Wire, robot: Robot) -> None:
-    with zenoh(town, "subscribe", "-k", "odom", "--decoder", "json") as process:
-        line = process.wait_for_line('"child_frame_id"')
-    assert "footprint_link" in line
-    assert "Traceback" not in process.err
-
-
 def test_it_puts_commands(town: Wire, robot: Robot) -> None:
     odoms = robot.odom.from_now()
 
@@ -55,14 +48,6 @@ def test_it_puts_commands(town: Wire, robot: Robot) -> None:
     robot.stands()
 
 
-def test_its_commands_that_are_wrong_are_refused(town: Wire, robot: Robot) -> None:
-    before = robot.status().refused.get("malformed", 0)
-    with zenoh(town, "put", "-k", "cmd_vel", "-v", '{"linaer":{"x":0.3}}') as process:
-        status = robot.status_when(lambda status: status.refused.get("malformed", 0) > before)
-        process.wait()
-    assert "unknown field `linaer`" in status.last_refusal
-
-
 def test_it_gets_the_last_odom(town: Wire, robot: Robot) -> None:
     before = time_of(robot.newest())
     with zenoh(town, "get", "-s", "odom", "--decoder", "json") as process:
@@ -70,17 +55,6 @@ def test_it_gets_the_last_odom(town: Wire, robot: Robot) -> None:
     shown = process.out[process.out.index("{") : process.out.rindex("}") + 1]
     stamp = json.loads(shown)["header"]["stamp"]
     assert stamp["sec"] + stamp["nanosec"] * 1e-9 >= before
-
-
-def test_it_asks_for_a_goal(town: Wire, robot: Robot) -> None:
-    town.start("pose-service").wait_for_line("goals")
-
-    def asked() -> str:
-        with zenoh(town, "get", "-s", "next_goal?request_goal=1", "--decoder", "json") as process:
-            process.wait()
-        return process.out
-
-    assert '"y_goal": 1' in wait_for(asked)
 
 
 def test_its_plugin_shows_any_wire_on_one_readable_line(wire: Wire) -> None:

@@ -196,10 +196,9 @@ def test_every_verb_has_help_without_any_extra(bare: Path) -> None:
 
 
 def test_data_files_are_found_inside_the_package(full: Path) -> None:
-    for name in ("'urdf', 'hb_bot.urdf.xacro'", "'meshes', 'base.dae'", "'worlds', 'gazebo.world'"):
-        path = Path(
-            answer(full, f"from holozen import data; print(json.dumps(str(data.find({name}))))")
-        )
+    names = [("urdf", "hb_bot.urdf.xacro"), ("meshes", "base.dae"), ("worlds", "gazebo.world")]
+    found = f"[str(data.find(*name)) for name in {names}]"
+    for path in map(Path, answer(full, f"from holozen import data; print(json.dumps({found}))")):
         assert path.is_file()
         assert full in path.parents
 

@@ -16,11 +16,12 @@ from holozen.robot.files.description import read, written
 from holozen.robot.files.loading import both, load, received
 from holozen.robot.model import RobotModel
 from services.camera.picture import Bytes
+from services.camera.rasterizer import Rasterizer
 
 MARKERS = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
 SIDE = 0.25  # m, of a sheet; the marker on it has a white rim
 HIGH = 3.0  # m; the height of the camera
-WIDTH, HEIGHT, FIELD = 1280, 960, 1.0
+WIDTH, HEIGHT, FIELD = 800, 600, 1.0
 PLACES = {"dae": (-0.9, 0.6), "obj": (0.9, 0.6), "script": (-0.9, -0.6), "urdf": (0.9, -0.6)}
 RIM = 8  # of the marker's 6 cells and this rim: pixels a cell
 
@@ -163,9 +164,9 @@ def test_each_marker_is_found_where_it_is(renderer: Any, sheets: dict[str, Path]
     } == places
 
 
-def test_they_are_sent_with_the_text_of_a_robot(renderer: Any, sheets: dict[str, Path]) -> None:
+def test_they_are_sent_with_the_text_of_a_robot(sheets: dict[str, Path]) -> None:
     models = {name: received(both(sheets[name], {}, {}, False, ())[1]) for name in PLACES}
-    assert found(seen(renderer, models)).keys() == {0, 1, 2, 3}
+    assert found(seen(Rasterizer(), models)).keys() == {0, 1, 2, 3}
 
 
 def test_a_missing_or_broken_image_is_named_and_the_mesh_is_drawn(

@@ -201,9 +201,7 @@ def test_a_reader_that_has_seen_enough_is_no_failure(
     assert (done.returncode, done.stderr) == (0, b"")
 
 
-@pytest.mark.parametrize(
-    "words", ["--help", "interface list", "interface proto std_msgs/msg/String"]
-)
+@pytest.mark.parametrize("words", ["--help", "interface list"])
 def test_output_into_a_full_disk_is_one_line(words: str) -> None:
     with open("/dev/full", "wb") as full:
         line = [sys.executable, "-m", "holozen", *words.split()]
@@ -281,7 +279,7 @@ def test_closed_standard_input_is_an_empty_one(words: str) -> None:
 
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-"])
-@pytest.mark.parametrize("words", ["doctor", "map --once", "check urdf/rover.urdf.xacro"])
+@pytest.mark.parametrize("words", ["map --once", "check urdf/rover.urdf.xacro"])
 def test_closed_output_is_no_error_of_its_own(words: str, closed: str) -> None:
     if words.split()[0] not in VERBS:
         pytest.skip(f"left out: {words}")
@@ -295,7 +293,7 @@ def test_closed_output_is_no_error_of_its_own(words: str, closed: str) -> None:
         ["sh", "-c", f'exec "$@" {closed}', "sh", *line], capture_output=True, text=True, timeout=60
     )
     assert "Traceback" not in done.stderr
-    assert (done.returncode, words) in ((0, "doctor"), (1, "doctor"), (1, "map --once"), (0, words))
+    assert done.returncode == (1 if "map" in words else 0)
 
 
 @needs("check")

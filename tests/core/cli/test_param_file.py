@@ -105,7 +105,7 @@ def test_a_missing_file_is_one_error_line(tmp_path: Path) -> None:
         ("sim: {ros__parameters: {a: [[1]]}}", "line 1: a parameter cannot be a list of lists"),
         ("sim: {ros__parameters: {a: .inf}}", "a is inf; write a finite number"),
         ("sim: {ros__parameters: {a: [1.0, .nan]}}", "a is [1.0, nan]; write a finite number"),
-        ("[" * 50_000, "it is nested too deeply"),
+        ("[\n" * 50_000, "it is nested too deeply"),
         ("x" * (LARGEST + 1), f"it is longer than {LARGEST} characters"),
     ]:
         path = tmp_path / "wrong.yaml"

@@ -87,8 +87,9 @@ def test_each_wire_has_what_a_reader_of_the_type_takes(wire: str) -> None:
 def test_each_topic_of_the_wire_is_published_by_its_key_alone(
     wire: Wire, run: Callable[..., object]
 ) -> None:
+    bus = wire.bus("reader")
     for row in TOPICS:
-        reader = wire.bus("reader").subscribe(row.key, *row.types)
+        reader = bus.subscribe(row.key, *row.types)
         run("topic", "pub", row.key, "{}", "--once")
         received = reader.recv()
         assert (received.message, received.error) == (row.types[0](), ""), row.key
@@ -130,7 +131,7 @@ def test_what_is_no_message_is_refused_with_the_reason() -> None:
         ("{1: 2}", "geometry_msgs/msg/Twist has no field '1'"),
         ("[" * 100_000, "the value is nested too deeply"),
         ('{"now":' * 20_000 + "1" + "}" * 20_000, "the value is nested too deeply"),
-        ("{" * 3000, "the value is nested too deeply"),
+        ("{\n" * 3000, "the value is nested too deeply"),
         ('{"linear": {"x": ' + "9" * 5000 + "}}", "4300 digits"),
         ('{"linear": {"x": ' + "9" * 500 + "}}", "is not a valid float64"),
         ('{"linear": {"x": 0.1, "x": 3}}', "'x' is given twice"),

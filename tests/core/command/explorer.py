@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from copy import copy
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from holozen.command.arbiter import AUTOPILOT, PERSON, Arbiter, Sent, Source
 from holozen.command.motion import is_stop
@@ -23,6 +23,7 @@ TICK = 1e-4  # s; the time that an event takes
 LATE = 0.1  # s by which a command is late that was sent before the event that precedes it
 QUANTUM = 0.6  # s; longer than the silence
 
+T = TypeVar("T")
 MakeArbiter = Callable[[], Arbiter]
 
 
@@ -61,7 +62,7 @@ class State:
 
     def apart(self) -> State:
         """A state that changes on its own."""
-        twin = copy(self)
+        twin = shallow(self)
         twin.ghosts = list(self.ghosts)
         twin.arbiter = clone(self.arbiter)
         return twin
@@ -104,12 +105,19 @@ class State:
         self.ghosts[index] = self.ghosts[index]._replace(**changes)
 
 
+def shallow(one: T) -> T:
+    """What copy.copy returns for an object without slots, but quicker."""
+    twin = object.__new__(type(one))
+    twin.__dict__.update(one.__dict__)
+    return twin
+
+
 def clone(arbiter: Arbiter) -> Arbiter:
     """A copy of an arbiter with a clock of its own."""
-    twin = copy(arbiter)
-    twin.time = copy(arbiter.time)
+    twin = shallow(arbiter)
+    twin.time = shallow(arbiter.time)
     twin.state = copy(arbiter.state)
-    twin.state.records = {rank: copy(records) for rank, records in arbiter.state.records.items()}
+    twin.state.records = {rank: shallow(records) for rank, records in arbiter.state.records.items()}
     for records in twin.state.records.values():
         records.named = dict(records.named)
     return twin
@@ -288,9 +296,9 @@ def events(state: State, with_world: bool) -> Iterator[Event]:
         yield "pause", pause
 
 
-def check(before: State, after: State, event: str) -> None:
-    """The promises that hold for every event."""
-    was, is_ = moving(before), moving(after)
+def check(was: Planar, after: State, event: str) -> None:
+    """The promises that hold for every event. `was`: how the robot moved before it."""
+    is_ = moving(after)
     if is_ != STOP and is_ != was:
         promise(
             event.partition(",")[0].endswith(" goes"),
@@ -315,12 +323,13 @@ def explore(
     todo = deque([begin_state])
     while todo:
         state = todo.popleft()
+        was = moving(state)
         for name, happens in events(state, with_world):
             after = state.apart()
             after.now += TICK
             try:
                 happens(after)
-                check(state, after, name)
+                check(was, after, name)
             except Promise as broken:
                 raise Promise(
                     f"{broken}; after: {', '.join([*_way(ways, state.key()), name])}"

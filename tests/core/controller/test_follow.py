@@ -41,7 +41,7 @@ from holozen.transport.errors import ServiceError
 from holozen.transport.pubsub import Publisher, Subscription
 from holozen.wire import ODOM_SILENCE
 from services.controller.backlog import HELD_UP, LATE, Backlog
-from services.controller.follow import Follower
+from services.controller.follow import STOP_FOR, Follower
 from services.controller.goto import Gains, Leg
 
 OLD = LATE, HELD_UP
@@ -166,6 +166,8 @@ def case(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> Iterator[Case]:
     # seconds.
     monkeypatch.setattr("services.controller.follow.MAX_AGE", 60.0)
     monkeypatch.setattr("holozen.odometry.ODOM_SILENCE", STALE)
+    # A status that lists no sources never shows that the robot has heard a stop.
+    monkeypatch.setattr("services.controller.follow.STOP_FOR", 0.2)
     end = threading.Event()
     with ThreadPoolExecutor() as pool:
         case = Case(wire, pool, end)
@@ -356,7 +358,10 @@ def test_a_pose_beyond_any_floor_is_not_believed(case: Case) -> None:
     assert len(lap.result(30)) == 2
 
 
-def test_a_stop_is_repeated_until_the_robot_rests(case: Case) -> None:
+def test_a_stop_is_repeated_until_the_robot_rests(
+    case: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("services.controller.follow.STOP_FOR", STOP_FOR)
     case.goals()
     lap = case.lap()
     wait_for(lambda: case.robot.heard)
@@ -563,6 +568,7 @@ def test_a_goal_that_a_link_may_have_held_up_is_refused(
     case: Case, quick_silence: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("services.controller.follow.SUSPENDED", 1.5)
+    monkeypatch.setattr("services.controller.backlog.CATCHING_UP", 0.5)
     case.lap()
 
     goals = case.robot.bus.publisher("goal_pose", PoseStamped)

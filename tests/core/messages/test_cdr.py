@@ -72,6 +72,7 @@ def odd_types() -> list[Interface]:
 
 
 ODD = odd_types()
+TOGETHER = 10  # of these have their values drawn at once, which is quicker
 
 
 def test_another_library_writes_and_reads_the_same_bytes(rosbags: Rosbags) -> None:
@@ -89,11 +90,16 @@ def test_another_library_writes_and_reads_the_same_bytes(rosbags: Rosbags) -> No
             interface.name
         )
 
-    for interface, count in (
-        *((REGISTRY.find(name), 15) for name in SOME),
-        *((odd, 2) for odd in ODD),
-    ):
-        settings(max_examples=count)(given(st.just(interface), values(interface))(agree))()
+    def agree_all(drawn: tuple[tuple[Interface, dict[str, Any]], ...]) -> None:
+        for interface, value in drawn:
+            agree(interface, value)
+
+    for name in SOME:
+        interface = REGISTRY.find(name)
+        settings(max_examples=15)(given(st.just(interface), values(interface))(agree))()
+    for first in range(0, len(ODD), TOGETHER):
+        some = [st.tuples(st.just(odd), values(odd)) for odd in ODD[first : first + TOGETHER]]
+        settings(max_examples=2)(given(st.tuples(*some))(agree_all))()
 
 
 def test_the_prototype_of_every_type_is_the_same_bytes(rosbags: Rosbags) -> None:

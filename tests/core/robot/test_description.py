@@ -15,6 +15,8 @@ from holozen.robot.files.meshes import bounds, file_in
 from holozen.robot.files.sdf_world import load_world
 from holozen.robot.files.uris import NOWHERE
 
+pytestmark = pytest.mark.usefixtures("forked")
+
 ROBOTS = sorted(
     path
     for path in data.find("urdf").glob("*.xacro")

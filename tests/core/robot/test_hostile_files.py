@@ -91,13 +91,13 @@ def checked(file: Path, package: Path) -> object:
 
 
 WAYS: dict[str, Callable[[Path, Path], object]] = {
+    "spawn_entity": lambda file, package: received(file.read_text(), {"bot": package}),
+    "description": lambda file, _package: read(file.read_text()),
+    "xacro": lambda file, package: expand_xacro(file, {}, {"bot": package}),
     "spawn": lambda file, package: both(file, {}, {"bot": package}, False, ()),
     "sim --robot": lambda file, package: load(file, {}, {"bot": package}),
     "sim --world": lambda file, package: load_world(file, {"bot": package}),
     **({"check": checked} if "check" in VERBS else {}),
-    "spawn_entity": lambda file, package: received(file.read_text(), {"bot": package}),
-    "description": lambda file, _package: read(file.read_text()),
-    "xacro": lambda file, package: expand_xacro(file, {}, {"bot": package}),
 }
 
 

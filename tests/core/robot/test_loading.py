@@ -32,6 +32,8 @@ from holozen.robot.model import (
 from tests.core.robots import ORIGIN, robot
 from tests.students import MIXED, ROS_1, ROS_2, hb_bot, workspace
 
+pytestmark = pytest.mark.usefixtures("forked")
+
 REPO = Path(__file__).parents[3]
 
 TWO_LINKS = '<link name="base"/><link name="wheel"/>'
@@ -742,64 +744,41 @@ def test_a_file_saved_on_windows_loads_as_well(home: Path) -> None:
     assert load(workspace(home, "ws", "\ufeff" + hb_bot(), ends="\r\n")).warnings == ()
 
 
-@pytest.mark.parametrize(
-    ("mistake", "message"),
-    [
-        (
-            {"frame": "chasis"},
-            "<robotBaseFrame> of <plugin name='object_controller'> names the base frame 'chasis', "
-            "which is not a link; "
-            "'footprint_link' is used",
-        ),
-        (
-            {"extra": '<gazebo reference="chasis"><mu1>1</mu1></gazebo>'},
-            "<gazebo reference='chasis'> names no link and no joint "
-            "(did you mean 'chassis'?); it is left out; "
-            "links: chassis, footprint_link, front, left, right",
-        ),
-        (
-            {"extra": '<gazebo reference="chassis"><material>Gazebo/Organe</material></gazebo>'},
-            "<material> of <gazebo reference='chassis'> names the colour 'Gazebo/Organe', which "
-            "Gazebo does not have "
-            "(did you mean 'Gazebo/Orange'?)",
-        ),
-        (
-            {"extra": '<gazebo><plugin name="c" filename="libgazebo_ros_control.so"/></gazebo>'},
-            "<plugin name='c'> (libgazebo_ros_control.so) is not supported; "
-            "joint_states is published anyway, and joints follow joint_command",
-        ),
-        (
-            {"extra": '<gazebo reference="chassis"><sensor type="gps" name="eye"/></gazebo>'},
-            "<sensor name='eye'> (gps) is not simulated",
-        ),
-        (
-            {"extra": '<transmission name="t"><joint name="font_joint"/></transmission>'},
-            "<transmission name='t'> names the joint 'font_joint', which does not exist (did you "
-            "mean 'front_joint'?); "
-            "it is left out",
-        ),
-        (
-            {
-                "extra": '<link name="caster"/><joint name="c" type="continuous"><parent '
-                'link="chassis"/>'
-                '<child link="caster"/></joint>'
-            },
-            "<link name='caster'> has no mass, so it is left out, as in Gazebo, with the joint "
-            "'c'; "
-            "give it an <inertial>",
-        ),
-    ],
-)
-def test_a_mistake_that_people_make_is_reported_in_one_line_and_the_robot_drives(
-    home: Path, mistake: dict[str, str], message: str
+MISTAKES = {
+    '<gazebo reference="chasis"><mu1>1</mu1></gazebo>': "<gazebo reference='chasis'> names no link "
+    "and no joint (did you mean 'chassis'?); it is left out; links: caster, chassis, "
+    "footprint_link, front, left, right",
+    '<gazebo reference="chassis"><material>Gazebo/Organe</material></gazebo>': "<material> of "
+    "<gazebo reference='chassis'> names the colour 'Gazebo/Organe', which Gazebo does not have "
+    "(did you mean 'Gazebo/Orange'?)",
+    '<gazebo><plugin name="c" filename="libgazebo_ros_control.so"/></gazebo>': "<plugin name='c'> "
+    "(libgazebo_ros_control.so) is not supported; joint_states is published anyway, and joints "
+    "follow joint_command",
+    '<gazebo reference="chassis"><sensor type="gps" name="eye"/></gazebo>': "<sensor name='eye'> "
+    "(gps) is not simulated",
+    '<transmission name="t"><joint name="font_joint"/></transmission>': "<transmission name='t'> "
+    "names the joint 'font_joint', which does not exist (did you mean 'front_joint'?); it is left "
+    "out",
+    '<link name="caster"/><joint name="c" type="continuous"><parent link="chassis"/>'
+    '<child link="caster"/></joint>': "<link name='caster'> has no mass, so it is left out, as in "
+    "Gazebo, with the joint 'c'; give it an <inertial>",
+}
+
+
+def test_each_mistake_that_people_make_is_reported_in_one_line_and_the_robot_drives(
+    home: Path,
 ) -> None:
-    path = workspace(home, "ws", hb_bot(**mistake))  # type: ignore[arg-type]
+    path = workspace(home, "ws", hb_bot(frame="chasis", extra="\n".join(MISTAKES)))
     model = load(path)
     assert model.drive == DRIVE
-    (warning,) = model.warnings
-    place, _, problem = warning.partition(": ")
-    assert place.startswith(f"{path}, line ")
-    assert problem == message
+    expected = [
+        "<robotBaseFrame> of <plugin name='object_controller'> names the base frame 'chasis', "
+        "which is not a link; 'footprint_link' is used",
+        *MISTAKES.values(),
+    ]
+    places, problems = zip(*(each.split(": ", 1) for each in model.warnings), strict=True)
+    assert all(place.startswith(f"{path}, line ") for place in places)
+    assert sorted(problems) == sorted(expected)
 
 
 def test_a_second_plugin_of_the_lesson_is_reported(home: Path) -> None:

@@ -10,6 +10,8 @@ from holozen.robot.errors import RobotError
 from holozen.robot.files.loading import both
 from holozen.robot.files.xacro import expand_xacro, is_xacro
 
+pytestmark = pytest.mark.usefixtures("forked")
+
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
 
 

@@ -10,6 +10,8 @@ from holozen.robot.errors import RobotError
 from holozen.robot.files import xacro
 from holozen.robot.files.xacro import digest, expand_xacro
 
+pytestmark = pytest.mark.usefixtures("forked")
+
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
 BODY = """
 <xacro:arg name="n" default="1"/>

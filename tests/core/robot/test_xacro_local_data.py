@@ -12,6 +12,8 @@ from holozen.robot.files.loading import load
 from holozen.robot.files.xacro import expand_xacro
 from tests.present import needs
 
+pytestmark = pytest.mark.usefixtures("forked")
+
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
 SECRET = "correct-horse"
 

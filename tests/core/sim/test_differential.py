@@ -79,7 +79,7 @@ class Driven:
 
 @pytest.mark.parametrize("model", [TWO, FOUR], ids=["two wheels", "four wheels"])
 def test_straight_on_it_goes_as_far_as_commanded(ground: World, model: RobotModel) -> None:
-    for speed in (0.5, -0.5, 1.0):
+    for speed in (-0.5, 1.0):
         ground.clear()
         robot = Driven(ground, model)
         start = robot.drive(1, (speed, 0, 0))
@@ -98,7 +98,7 @@ def test_forward_is_forward_whichever_way_an_axis_points(ground: World, name: st
 @pytest.mark.engines
 def test_two_wheels_turn_as_fast_as_commanded(ground: World) -> None:
     robot = Driven(ground, TWO)
-    for turn in (0.5, -1.0, 3.0):
+    for turn in (0.5, -3.0):
         robot.drive(1, (0, 0, turn))
         begin = robot.turned
         robot.drive(2, (0, 0, turn))
@@ -107,13 +107,13 @@ def test_two_wheels_turn_as_fast_as_commanded(ground: World) -> None:
 
 @pytest.mark.engines
 def test_four_wheels_turn_at_nearly_the_commanded_rate(ground: World) -> None:
-    for velocity in ((0, 0, 0.2), (0, 0, -1), (0, 0, 4), (0.4, 0, 1)):
+    for velocity in ((0, 0, 0.2), (0, 0, -4), (0.4, 0, 1)):
         ground.clear()
         robot = Driven(ground, FOUR)
         start = robot.drive(1, velocity)
         begin = robot.turned
-        end = robot.drive(4, velocity)
-        assert 0.85 < (robot.turned - begin) / (4 * velocity[2]) < 1.01, velocity
+        end = robot.drive(2, velocity)
+        assert 0.85 < (robot.turned - begin) / (2 * velocity[2]) < 1.01, velocity
         if velocity[0] == 0:
             assert math.dist(start[:2], end[:2]) < 0.02
 

@@ -8,13 +8,14 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 import zenoh
 
+from holozen.bus import Bus
 from holozen.command.outcome import Outcome
 from holozen.command.stop_files import StopFiles
 from holozen.messages import (
@@ -78,12 +79,18 @@ class Town:
     """A world with its services, answered while a request waits."""
 
     def __init__(self, wire: Wire, world: World) -> None:
-        self.bus, self.client = wire.bus("sim"), wire.bus("client")
+        self.wire, self.bus = wire, wire.bus("sim")
         self.entities = Entities(self.bus, world, (5.0, 10.0))
         self.services = EntityServices(self.bus, self.entities, {})
         self.loop = Loop(self.bus, world, self.entities, 0.0)
         self.loop.answers.append(self.services.answer)
-        wait_for(self.client.connected)
+
+    @cached_property
+    def client(self) -> Bus:
+        """A process beside the sim, from its first use on."""
+        client = self.wire.bus("client")
+        wait_for(client.connected)
+        return client
 
     def spawn(
         self,

@@ -137,7 +137,7 @@ def test_random_drives_of_a_person_in_the_arena_touch_nothing(
         touched.update(ride.touched())
         limited += bool(ride.limited)
 
-    drives = trials(120, 1200)
+    drives = trials(48, 1200)
     for _ in range(drives):
         x, y, turn = (chance.choice((-1, 0, 1)) for _ in range(3))
         speed, before = chance.choice((0.15, 0.5, 1.0, 2.0)), ride.at

@@ -46,7 +46,7 @@ def place(mover: OmniMover) -> Planar:
 @pytest.mark.engines
 def test_it_goes_where_the_twist_commands(ground: World) -> None:
     mover = put(ground)
-    for velocity in ((0.3, 0, 0), (0, 0.3, 0), (0.2, -0.2, 0), (0, 0, 0.8), (0.3, 0, 0.5)):
+    for velocity in ((0, 0.3, 0), (0, 0, 0.8), (0.3, -0.2, 0.5)):
         goes(ground, mover, velocity, 2e-3)
 
 
@@ -149,7 +149,7 @@ def test_the_same_commands_end_in_the_same_bits_with_contacts_and_after_a_reset(
 
 
 @pytest.mark.engines
-@pytest.mark.parametrize("axis", ["0 1 0", "0.8 0.6 0", "0 0.6 0.8"])
+@pytest.mark.parametrize("axis", ["0.8 0.6 0", "0 0.6 0.8"])
 def test_a_wheel_of_any_frame_is_free_along_its_axle_alone(ground: World, axis: str) -> None:
     """The same robot, with the frames of its wheels turned in their joints."""
     x, y, z = map(float, axis.split())

@@ -200,6 +200,8 @@ def test_the_keys_of_a_script_are_held_whatever_those_of_a_terminal_are(
 def test_without_its_robot_it_names_those_that_are_there(
     wire: Wire, run: Run, commands: Subscription[Twist], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(script, "PATIENCE", 1.0)
+
     def refusal(*words: str) -> str:
         monkeypatch.setattr(sys, "stdin", io.StringIO("1s i"))
         code, _, error = run("teleop", *words, "--script", "-")

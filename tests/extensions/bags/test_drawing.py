@@ -54,12 +54,17 @@ def test_a_long_track_is_thinned_out_and_keeps_its_ends() -> None:
     assert len({b[0] - a[0] for a, b in zip(track.rows, track.rows[1:], strict=False)}) == 1
 
 
-def test_a_bag_is_drawn_as_png_and_svg(tmp_path: Path) -> None:
+def test_a_bag_is_drawn_as_png_and_as_svg_whose_legends_say_what_each_line_is(
+    tmp_path: Path,
+) -> None:
     bag = a_bag(tmp_path / "a.mcap")
     assert draw(bag, tmp_path / "a.png").topics == {"odom": 20, "cmd_vel": 10}
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
-    draw(bag, tmp_path / "a.svg", ["odom"])
+    draw(bag, tmp_path / "a.svg", ["odom"], paths={"odom": [(0, 0), (1, 0), (1, 1)]})
     assert ET.parse(tmp_path / "a.svg").getroot().tag.endswith("svg")
+    drawn = (tmp_path / "a.svg").read_text()
+    for label in ("odom: measured", "cmd_vel: commanded", "odom: wished path"):
+        assert f"<!-- {label} -->" in drawn
 
 
 def test_what_cannot_be_drawn_is_reported(tmp_path: Path) -> None:
@@ -76,14 +81,6 @@ def test_what_cannot_be_drawn_is_reported(tmp_path: Path) -> None:
 def test_a_bag_without_odometry_is_reported(tmp_path: Path) -> None:
     with pytest.raises(BagError, match="has no odometry to draw"):
         draw(a_bag(tmp_path / "a.mcap", count=0), tmp_path / "a.png")
-
-
-def test_the_legends_say_what_each_line_is(tmp_path: Path) -> None:
-    bag = a_bag(tmp_path / "a.mcap")
-    draw(bag, tmp_path / "a.svg", paths={"odom": [(0, 0), (1, 0), (1, 1)]})
-    drawn = (tmp_path / "a.svg").read_text()
-    for label in ("odom: measured", "cmd_vel: commanded", "odom: wished path"):
-        assert f"<!-- {label} -->" in drawn
 
 
 SQUARE = "0 0 # x y, and theta as goals have it\n1, 0\n1 1 1.57\n0 1\n"

@@ -1,13 +1,15 @@
 """A good robot, of which each test breaks one part, and its findings."""
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from holozen.check.mistake import Finding
 from holozen.check.report import check
+from holozen.robot.files import reader
 
 Findings = Callable[..., list[Finding]]
 
@@ -28,6 +30,29 @@ def good_sdf() -> str:
     return (HERE / "good.sdf").read_text()
 
 
+def check_here(path: Path, **options: Any) -> list[Finding]:
+    """The findings in a file, by a reader in this process: to fork one a file takes longer than to
+    check it. The tests of the verb have the real one.
+    """
+
+    def run(
+        _kind: object,
+        _what: object,
+        function: Callable[..., object],
+        *args: object,
+        handlers: Mapping[str, reader.Handler] = {},
+        **_limits: object,
+    ) -> object:
+        with pytest.MonkeyPatch.context() as patch:
+            if handlers:
+                patch.setattr(reader, "ask", lambda name, *rest: handlers[name](*rest))
+            return function(*args)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reader, "run", run)
+        return check(path, **options)[0]
+
+
 @pytest.fixture
 def findings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Findings:
     """The findings in a text, saved under a name in an empty folder."""
@@ -41,7 +66,7 @@ def findings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Findings:
 
     def look(text: str, name: str = "robot.urdf", **options: object) -> list[Finding]:
         (tmp_path / name).write_text(text)
-        return check(tmp_path / name, **options)[0]  # type: ignore[arg-type]
+        return check_here(tmp_path / name, **options)
 
     return look
 

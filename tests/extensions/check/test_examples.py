@@ -70,6 +70,8 @@ def test_each_rule_has_an_example_that_it_finds_and_one_that_it_does_not(
                 required.write_text(part)
             text = good if required else whole(rule, part, good)
             requirements = Requirements((0.4, 0.3) if rule == "fits" else (), required)
+            if (text, requirements) == (good, Requirements()) and not expected and rule != names[0]:
+                continue  # which the first rule has shown
             found = findings(
                 text,
                 "robot.urdf.xacro" if "xacro:" in text else "robot.urdf",

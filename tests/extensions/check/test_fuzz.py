@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from holozen.check.report import check
-from tests.extensions.check.conftest import HERE
+from tests.extensions.check.conftest import HERE, check_here
 
 Trials = Callable[[int, int], int]
 REPO = HERE.parents[2]
@@ -64,7 +63,7 @@ def test_nothing_but_findings_comes_out(path: Path, tmp_path: Path, trials: Tria
     text, broken, count = path.read_text(), 0, trials(60, 1000)
     for number, changed in enumerate(mutations(text, 4, count)):
         (tmp_path / path.name).write_text(changed)
-        found = check(tmp_path / path.name)[0]
+        found = check_here(tmp_path / path.name)
         broken += bool(found)
         for finding in found:
             assert len(str(finding).splitlines()) == 2, (number, finding)
@@ -76,5 +75,5 @@ def test_nothing_but_findings_comes_out_of_xacro(tmp_path: Path, trials: Trials)
     text = (REPO / "urdf" / "hb_bot.urdf.xacro").read_text()
     for changed in mutations(text, 4, trials(3, 50)):
         (tmp_path / "r.xacro").write_text(changed)
-        for finding in check(tmp_path / "r.xacro", packages={"holo": REPO})[0]:
+        for finding in check_here(tmp_path / "r.xacro", packages={"holo": REPO}):
             assert len(str(finding).splitlines()) == 2, finding

@@ -9,11 +9,10 @@ from pathlib import Path
 import pytest
 
 from holozen.check import rules_xml
-from holozen.check.report import check
 from holozen.check.subject import Requirements
 from holozen.robot.files import gazebo_plugins
 from holozen.robot.files.loading import load
-from tests.extensions.check.conftest import HERE, Findings
+from tests.extensions.check.conftest import HERE, Findings, check_here
 
 Rules = Callable[..., list[str]]
 
@@ -774,7 +773,7 @@ def test_no_measure_is_taken_from_a_robot_in_millimetres(good: str, findings: Fi
 def test_files_for_robots_to_include_are_silent() -> None:
     """The robots of urdf/ are checked in tests/integration/test_robots.py."""
     for name in ("materials.xacro", "wheels.xacro"):
-        assert check(HERE.parents[2] / "urdf" / name)[0] == []
+        assert check_here(HERE.parents[2] / "urdf" / name) == []
 
 
 def test_a_requested_size_is_measured(good: str, findings: Findings) -> None:

@@ -233,9 +233,6 @@ def test_ctrl_c_at_any_line_of_a_call_leaves_nothing_half_made(
                 raise KeyboardInterrupt
             return trace
 
-        # what is collected during the call would take the interrupt, and nobody would see it
-        gc.collect()
-        gc.disable()
         sys.settrace(trace)
         try:
             client.call_async(Trigger.Request())
@@ -244,10 +241,14 @@ def test_ctrl_c_at_any_line_of_a_call_leaves_nothing_half_made(
             return True
         finally:
             sys.settrace(None)
-            gc.enable()
         return False
 
-    count = next(number for number in itertools.count(1) if not is_interrupted_at(number))
+    # what is collected during a call would take the interrupt, and nobody would see it
+    gc.disable()
+    try:
+        count = next(number for number in itertools.count(1) if not is_interrupted_at(number))
+    finally:
+        gc.enable()
     assert count > 15, "the lines of a call were traced"
     client.destroy()
     session.wait_for_threads(client.threads(), 10)

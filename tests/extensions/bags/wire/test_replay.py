@@ -348,7 +348,8 @@ def test_it_may_wait_before_it_begins(verb: Verb, wire: Wire, tmp_path: Path) ->
     player = wire.start(
         "bag", "play", "--delay", "1000", bag(tmp_path / "a.mcap", ("a", b"x", "", 0.0))
     )
-    wait_for(lambda: on_key(bus.endpoints(), "a", "pub"))
+    graph = bus.graph()
+    wait_for(lambda: on_key(graph.endpoints(), "a", "pub"))
     assert player.interrupt() == 0
     assert player.out.startswith("played 0 messages")
     quick = verb(wire, "bag", "play", "-d", "0.1", str(tmp_path / "a.mcap"))

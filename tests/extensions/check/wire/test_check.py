@@ -1,14 +1,12 @@
 """`holozen check` as a person runs it."""
 
 import json
-import subprocess
 from functools import partial
 from pathlib import Path
 
 import pytest
 
 from holozen import data
-from holozen.testing.wire import command
 from tests.integration.conftest import Verb
 
 BOT = data.find("urdf", "hb_bot.urdf.xacro")
@@ -27,14 +25,14 @@ def run(call: Verb) -> Verb:
 
 
 def test_a_good_file_is_summed_up_in_one_line(run: Verb, tmp_path: Path) -> None:
-    done = subprocess.run(command("check", str(BOT)), capture_output=True, text=True, timeout=30)
+    done = run(str(BOT))
     assert (done.returncode, done.stdout, done.stderr) == (
         0,
         "ok: 5 links, 3 wheels, planar_move on cmd_vel\n",
         "",
     )
-    assert run(str(BOT), "--json").stdout == ""
     (tmp_path / "r.urdf").write_text(WARNS.replace("9", "0.004"))
+    assert run(str(tmp_path / "r.urdf"), "--json").stdout == ""
     # wheels whose collision shapes are those of rollers
     omni = "ok: 40 links, holozen_omni_drive on cmd_vel\n"
     assert run(str(data.find("urdf", "omni.urdf.xacro"))).stdout == omni

@@ -342,9 +342,7 @@ finally:
 """
 
 
-@pytest.mark.parametrize(
-    "number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda n: n.name
-)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP], ids=lambda n: n.name)
 def test_a_signal_ends_the_nodes_and_the_launch(
     wire: Wire, write: Write, my_bot: Path, number: int
 ) -> None:

@@ -209,12 +209,3 @@ def test_server_client_xacro_in_python_and_two_robots(wire: Wire, launch: Launch
     assert [ann.x, bob.y] == pytest.approx([-1, 2], abs=0.05)
     assert "Gazebo's window is left out" in process.err
     assert process.terminate() == 0
-
-
-def test_the_launch_ends_when_the_sim_does(wire: Wire, launch: Launch, workspace: Path) -> None:
-    world = workspace / "src" / "my_bot" / "worlds" / "lesson.world"
-    world.write_text("<sdf")
-    process = launch("classic.launch.py")
-    assert process.wait(within=60) == 1
-    assert "[sim-1] sim: " in process.err
-    assert "launch: ending: sim-1 has ended, and everything here depends on it" in process.err

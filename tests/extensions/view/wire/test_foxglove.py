@@ -356,7 +356,7 @@ def test_no_port_of_it_answers_without_the_token(wire: Wire) -> None:
 
     async def answers(port: int) -> bool:
         try:
-            async with asyncio.timeout(5), client(f"ws://127.0.0.1:{port}") as foxglove:
+            async with asyncio.timeout(2), client(f"ws://127.0.0.1:{port}") as foxglove:
                 return bool(foxglove)
         except (WebSocketException, OSError, TimeoutError, EOFError):
             return False
