@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 from holozen import entities
-from holozen.bus import Bus
 from holozen.messages import Clock
 from holozen.messages import simulation_interfaces as si
 from holozen.robot.files.xacro import expand_xacro
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.errors import ServiceError
+from holozen.transport.graph import Endpoint
 
 from .conftest import SPAWN, Verb
 from .robots import Robot, distance, place
@@ -48,11 +48,9 @@ def wire(town: Wire) -> Wire:
     return town
 
 
-def keys(bus: Bus) -> set[str]:
+def keys(endpoints: list[Endpoint]) -> set[str]:
     """What the sim stands on."""
-    return {
-        endpoint.key for endpoint in bus.graph().settled(bus.connected) if endpoint.node == "sim"
-    }
+    return {endpoint.key for endpoint in endpoints if endpoint.node == "sim"}
 
 
 def patiently(words: tuple[str, ...]) -> tuple[str, ...]:
@@ -217,13 +215,14 @@ def test_a_robot_deleted_while_it_drives_leaves_no_key_alive(
     verb: Verb, wire: Wire, sim: Process
 ) -> None:
     bus = wire.bus()
-    before = keys(bus)
+    graph = bus.graph()
+    before = keys(graph.settled(bus.connected))
     done(verb, wire, "spawn", HB_BOT, "--name", "Fred")
     fred = Robot(bus, "Fred")
     fred.drive(0.5)
     done(verb, wire, "delete", "Fred")
     odoms = fred.odom.from_now()
-    wait_for(lambda: keys(bus) == before)
+    wait_for(lambda: keys(graph.endpoints()) == before)
     clock = bus.latest("clock", Clock)
     wait_for(lambda: clock.count > 20)
     assert odoms.messages() == []
@@ -234,8 +233,8 @@ def test_many_robots_in_a_row_leave_no_key_and_little_memory_and_the_sim_keeps_i
 ) -> None:
     count = trials(50, 200)
     bus = wire.bus()
-    text = expand_xacro(Path(HB_BOT))
-    before, clock = keys(bus), bus.latest("clock", Clock)
+    graph, text = bus.graph(), expand_xacro(Path(HB_BOT))
+    before, clock = keys(graph.settled(bus.connected)), bus.latest("clock", Clock)
 
     def spawn_and_delete(name: str) -> None:
         bus.call(
@@ -252,7 +251,7 @@ def test_many_robots_in_a_row_leave_no_key_and_little_memory_and_the_sim_keeps_i
     for number in range(count):
         spawn_and_delete(f"robot_{number}")
     assert resident(sim) - memory < 7e6 + 65e3 * count
-    wait_for(lambda: keys(bus) == before)
+    wait_for(lambda: keys(graph.endpoints()) == before)
     reported = clock.count
     wait_for(lambda: clock.count > reported + 50)  # it still publishes the time, 50 times a second
     assert bus.call("get_entities", si.GetEntitiesRequest(), si.GetEntitiesReply).entities == []
