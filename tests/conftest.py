@@ -122,6 +122,8 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Generator[None, None, Non
                 patch.delenv(name)
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+        # pytest in a test: at its end it tidies up a folder that this one uses too
+        patch.setenv("PYTEST_DEBUG_TEMPROOT", str(tmp_path_factory.mktemp("pytest")))
         yield
 
 
