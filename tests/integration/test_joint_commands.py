@@ -190,7 +190,7 @@ def test_pub_reports_nothing_of_a_joint_command_that_is_obeyed(
     def reported() -> tuple[int, list[str]]:
         """Something where a busy machine made a command too late."""
         command = ("joint_command", "{name: [jFL], velocity: [1]}")
-        done = verb(town, "topic", "pub", *command, "-t", "10", "-r", "20")
+        done = verb(town, "topic", "pub", *command, "-t", "10", "-r", "100")
         return done.returncode, [line for line in done.stderr.splitlines() if "obeyed" in line]
 
     comes_to((0, []), reported)
