@@ -405,7 +405,13 @@ class Node:
             # for 256 replies.
             replies: Any = zenoh.handlers.FifoChannel(MAX_TOKENS)
             timeout, began = max(ROLL_CALL, self.took), time.monotonic()
-            for _ in live.get(keys, replies, timeout=timeout):
+            try:
+                asked = live.get(keys, replies, timeout=timeout)
+            except zenoh.ZError:
+                if self._closing.is_set():  # by another thread
+                    raise BusError("closed") from None
+                raise
+            for _ in asked:
                 pass
             return time.monotonic() - began < timeout
 

@@ -610,3 +610,13 @@ def test_commands_go_out_at_once_and_telemetry_in_batches(pair: tuple[Bus, Bus])
         for sample in (samples.recv(), samples.recv(), samples.recv())
     }
     assert express == {"cmd_vel": True, "odom": False, "Fred/joint_states": False}
+
+
+def test_a_graph_that_settles_while_another_thread_closes_its_bus_says_so(wire: Wire) -> None:
+    wire.bus("other")
+    bus = wire.bus("me")
+    graph = bus.graph()
+    graph.settled(bus.connected)
+    bus.close()
+    with pytest.raises(BusError, match="closed"):
+        graph.settled(lambda: True)

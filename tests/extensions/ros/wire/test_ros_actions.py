@@ -177,14 +177,14 @@ def printed(process: Process) -> list[str]:
     return process.out.splitlines()
 
 
+PROGRESS = ["feedback [0, 1, 1]", "feedback [0, 1, 1, 2]", "feedback [0, 1, 1, 2, 3]"]
+
+
 def test_a_goal_is_accepted_reports_its_progress_and_succeeds(town: Wire, scripts: Path) -> None:
-    assert printed(client(town, scripts, "4")) == [
-        "accepted",
-        "feedback [0, 1, 1]",
-        "feedback [0, 1, 1, 2]",
-        "feedback [0, 1, 1, 2, 3]",
-        "result 4 [0, 1, 1, 2, 3]",
-    ]
+    accepted, *progress, result = printed(client(town, scripts, "4"))
+    assert (accepted, result) == ("accepted", "result 4 [0, 1, 1, 2, 3]")
+    # it comes by a topic, so the reply may overtake the last of it
+    assert progress in (PROGRESS, PROGRESS[:-1])
 
 
 def test_progress_waits_for_the_callback_of_the_answer_however_late_it_is_added(
