@@ -4,7 +4,7 @@ import compileall
 import multiprocessing
 import os
 import shutil
-import socket
+import signal
 import sys
 import threading
 import time
@@ -15,6 +15,7 @@ from typing import Any
 
 from holozen.bus import Bus
 from holozen.messages import Odometry
+from holozen.testing.wire import free_port
 from holozen.transport.connection import Connection
 
 PATIENCE = 60.0  # s for the other process to come up
@@ -37,9 +38,7 @@ def page_address(printed: str) -> str:
 
 def meeting_point() -> str:
     """An endpoint that no running robot uses."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    return f"tcp/127.0.0.1:{free_port()}"
 
 
 def host(endpoint: str) -> Connection:
@@ -59,7 +58,7 @@ def client(endpoint: str) -> Connection:
 
 @contextmanager
 def beside(job: Callable[..., None], *args: Any) -> Iterator[None]:
-    """Within this block another process runs `job(*args)`, which never returns."""
+    """Within this block another process runs `job(*args)`. If that fails, the benchmark ends."""
     benchmark = Path(sys.modules[job.__module__].__file__ or "").stem
     PROCESSES.set_forkserver_preload([f"benchmarks.{benchmark}"])
     process = PROCESSES.Process(target=_run, args=(job, *args), daemon=True)
@@ -108,11 +107,16 @@ def compile_tree() -> None:
 
 
 def _run(job: Callable[..., None], *args: Any) -> None:
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    job(*args)
+    parent = multiprocessing.parent_process()
+    assert parent and parent.pid
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    try:
+        job(*args)
+    except BaseException:  # the benchmark would wait for its result
+        os.kill(parent.pid, signal.SIGINT)
+        raise
 
 
-def _end_with_parent() -> None:
-    if parent := multiprocessing.parent_process():
-        parent.join()
+def _end_with(parent: Any) -> None:
+    parent.join()
     os._exit(0)

@@ -8,7 +8,6 @@ time and losses.
 import sys
 import time
 from collections.abc import Callable
-from multiprocessing.connection import Connection as Pipe
 from typing import Any
 
 from benchmarks.company import PROCESSES, beside, guest, host, meeting_point
@@ -102,20 +101,14 @@ def listen_on_bus(endpoint: str, count: int) -> Result:
 
 def in_a_process(job: Callable[[str, int], Result], endpoint: str, count: int) -> Result:
     """The result of `job`, run in a process of its own."""
-    here, there = PROCESSES.Pipe()
-    process = PROCESSES.Process(
-        target=_send_result, args=(there, job, endpoint, count), daemon=True
-    )
-    process.start()
-    result: Result = here.recv()
-    process.join()
+    results = PROCESSES.Queue()
+    with beside(_put_result, results, job, endpoint, count):
+        result: Result = results.get()
     return result
 
 
-def _send_result(
-    pipe: "Pipe[Any, Any]", job: Callable[[str, int], Result], endpoint: str, count: int
-) -> None:
-    pipe.send(job(endpoint, count))
+def _put_result(results: Any, job: Callable[[str, int], Result], endpoint: str, count: int) -> None:
+    results.put(job(endpoint, count))
 
 
 def compare(turns: int, count: int) -> tuple[list[Case], dict[str, int]]:

@@ -18,6 +18,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import count
 from typing import Any
@@ -202,6 +203,21 @@ class Turns:
         return True
 
 
+Channel = tuple[int, int]
+"""A client, and the number that it gave its channel."""
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A channel on which a client publishes messages of a `kind`."""
+
+    publisher: Publisher[Any]
+    kind: type[Message]
+    encoding: str
+    stops: list[Message] = field(default_factory=list)
+    """What stops all that it has moved."""
+
+
 class Commands:
     """Publishes what clients send, by the rules of the page: with a person's priority, and with a
     stop at the end.
@@ -210,36 +226,35 @@ class Commands:
     def __init__(self, bus: Bus, endpoints: Callable[[], list[Endpoint]]) -> None:
         self._bus, self._endpoints = bus, endpoints
         self._lock = threading.Lock()
-        self._open = dict[
-            tuple[int, int], tuple[Publisher[Any], type[Message], str, list[Message]]
-        ]()  # with its stops
+        self._advertised = dict[Channel, dict[str, Any]]()
+        self._open = dict[Channel, Opened]()
         self._ends = False
         self._turns = Turns()
 
     def open(self, client: int, channel: dict[str, Any]) -> None:
         """Let a client publish on a channel. Raises ValueError if no node reads that topic as that
-        type.
+        type by now; each message that comes on the channel looks again.
         """
-        number, key = int(channel["id"]), str(channel["topic"]).strip("/")
-        name, form = _full_name(str(channel.get("schemaName"))), channel.get("encoding")
+        number = int(channel["id"])
+        self.close(client, number)  # it may be another topic than before
+        with self._lock:
+            self._advertised[client, number] = channel
+            self._open[client, number] = self._opened(channel)
+
+    def _opened(self, channel: dict[str, Any]) -> Opened:
+        key, name = str(channel["topic"]).strip("/"), _full_name(str(channel.get("schemaName")))
+        form = channel.get("encoding")
         readers = {one.type for one in self._endpoints() if one.kind == "sub" and one.key == key}
         if name not in readers or name not in formats.known():
             reads = f"it is read as {', '.join(sorted(readers))}" if readers else "no node reads it"
             raise ValueError(f"/{key} cannot be published as {name or 'nothing'}: {reads}")
         if form not in ("json", "cdr"):
             raise ValueError(f"/{key} cannot be published in {form!r}; use json or cdr")
+        if self._ends:
+            raise ValueError("the view ends, and publishes no more")
         kind = formats.known()[name]
         priority = PRIORITY_OF["view"] if is_command(key, (kind.ROS,)) else "DATA"
-        encoding = codec.encoding(form, kind)
-        with self._lock:
-            if self._ends:
-                raise ValueError("the view ends, and publishes no more")
-            self._open[client, number] = (
-                self._bus.publisher(key, kind, priority),
-                kind,
-                encoding,
-                [],
-            )
+        return Opened(self._bus.publisher(key, kind, priority), kind, codec.encoding(form, kind))
 
     def put(self, client: int, channel: int, data: bytes, sent: float) -> None:
         """Publish a client's message that was sent at `sent` (s, monotonic) or later. Raises
@@ -248,12 +263,14 @@ class Commands:
         suspended.
         """
         with self._lock:
-            if not (found := self._open.get((client, channel))):
+            if (advertised := self._advertised.get((client, channel))) is None:
                 return
-            publisher, kind, encoding, stops = found
-            key = str(publisher.key)
+            if (client, channel) not in self._open:
+                self._open[client, channel] = self._opened(advertised)
+            opened = self._open[client, channel]
+            key, kind = str(opened.publisher.key), opened.kind
             try:
-                message = codec.decode(data, encoding, (kind,))
+                message = codec.decode(data, opened.encoding, (kind,))
                 # to a goal the controller drives
                 drives = is_command(key, (kind.ROS,)) and kind is not PoseStamped
                 waited = max(0.0, time.monotonic() - sent)
@@ -265,10 +282,10 @@ class Commands:
                 if drives:
                     self._take_turn(key, client, message)
                     fields = stop(message, kind.ROS)
-                    if fields is not None and (stopped := kind(**fields)) not in stops:
-                        stops.append(stopped)
-                        del stops[:-MAX_STOPS]
-                publisher.put(message, waited)
+                    if fields is not None and (stopped := kind(**fields)) not in opened.stops:
+                        opened.stops.append(stopped)
+                        del opened.stops[:-MAX_STOPS]
+                opened.publisher.put(message, waited)
             except codec.CodecError as error:
                 raise ValueError(f"/{key}: {error}") from None
 
@@ -281,11 +298,11 @@ class Commands:
     def close(self, client: int, channel: int) -> None:
         """A client stops publishing on a channel: stop what it moved by it."""
         with self._lock:
-            if found := self._open.pop((client, channel), None):
-                publisher, _, _, stops = found
-                for stopped in stops:
-                    publisher.put(stopped)
-                publisher.close()
+            self._advertised.pop((client, channel), None)
+            if opened := self._open.pop((client, channel), None):
+                for stopped in opened.stops:
+                    opened.publisher.put(stopped)
+                opened.publisher.close()
 
     def halt(self) -> None:
         """Stop the robots that are driven from here; from now on clients publish nothing."""
@@ -574,8 +591,8 @@ class Server:
                     with self._reporting_errors(client):
                         if self._look_only:
                             raise ValueError(LOOK_ONLY)
-                        self._commands.open(client.number, channel)
                         client.channels.add(int(channel["id"]))
+                        self._commands.open(client.number, channel)
             case "unadvertise":
                 for number in client.channels.intersection(message["channelIds"]):
                     self._commands.close(client.number, number)

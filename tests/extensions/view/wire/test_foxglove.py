@@ -257,6 +257,30 @@ def test_joints_stop_when_the_connection_ends(town: Wire, view: Callable[..., st
     )
 
 
+def test_a_channel_that_was_advertised_before_its_robot_came_reaches_it(
+    town: Wire, view: Callable[..., str]
+) -> None:
+    async def publish(address: str) -> None:
+        channel = {
+            "id": 7,
+            "topic": "/late/cmd_vel",
+            "encoding": "json",
+            "schemaName": "geometry_msgs/Twist",
+        }
+        async with client(address) as foxglove:
+            await foxglove.send(op="advertise", channels=[channel])
+            await foxglove.publish(7, b"{}")
+            await foxglove.until(lambda: len(foxglove.statuses) == 2)  # one for each
+            assert all("no node reads it" in text for text in foxglove.statuses)
+            commands = record(town.bus("late"), "late/cmd_vel", Twist)
+            async with asyncio.timeout(PATIENCE):
+                while Twist.planar(0.3, 0.0, 0.0) not in commands.messages():
+                    await foxglove.publish(7, b'{"linear": {"x": 0.3}}')
+                    await asyncio.sleep(0.05)
+
+    asyncio.run(publish(view()))
+
+
 def test_what_waited_in_a_link_moves_nothing_and_ends_no_stop_or_pause_from_after_it_but_a_stop_counts(  # noqa: E501
     town: Wire, view: Callable[..., str]
 ) -> None:
