@@ -48,6 +48,8 @@ def install(packages: Mapping[str, Path] = {}, near: Sequence[Path] = ()) -> Non
 
 def remove() -> None:
     """Undo `install`, and forget the modules that were imported."""
+    if not _installed:
+        return
     for finder in _installed:
         sys.meta_path.remove(finder)
     _installed.clear()
