@@ -185,7 +185,8 @@ class Driver:
     def _goals(self) -> Publisher[PoseStamped]:
         goals = self._bus.publisher(key_for("goal_pose", self.namespace), PoseStamped)
         if goals.echoes:
-            goals.echoes.settle(PATIENCE)  # a click waits in a thread of its own
+            # a click waits in a thread of its own; then it is known whether a controller subscribes
+            goals.echoes.settle(PATIENCE)
         return goals
 
     def send_to(self, x: float, y: float, true_pose: Pose) -> str:
@@ -198,8 +199,10 @@ class Driver:
         if not self._goals.matched:
             command = " ".join(filter(None, ("holozen controller", self.namespace, "--laps 0")))
             return f"it has no controller; `{command}` starts one"
-        if self._goals.echoes and not self._goals.echoes.may_command():
-            return "its controller was not heard yet; try it again in a moment"
+        if echoes := self._goals.echoes:
+            echoes.settle(PATIENCE)  # of one that has just come, its subscription is known first
+            if not echoes.may_command():
+                return "its controller was not heard yet; try it again in a moment"
         goal = in_odometry((x, y, true_pose.position.z), true_pose, odom.pose.pose)
         frame = odom.header.frame_id
         self._goals.put(

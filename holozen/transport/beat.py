@@ -318,12 +318,10 @@ class Echoes(Declared):
             return listed(session[:6] for session in self._watched) if is_waiting else ""
 
     def settle(self, timeout: float = SETTLE) -> None:
-        """Before the first command: wait for the receivers that are there to be known, and for a
-        beat of one of them, at most `timeout` seconds. Does nothing later: call it with 0 where
-        nothing may wait.
+        """Until a beat was heard: wait for the receivers that are there to be known, and for a beat
+        of one of them, at most `timeout` seconds. The first command does so, unless this was called
+        before it: with 0 where nothing may wait.
         """
-        if self._is_settled:
-            return
         self._is_settled = True
         deadline = time.monotonic() + timeout
         if not self.heard and timeout:
@@ -335,7 +333,8 @@ class Echoes(Declared):
         """Whether a motion may be sent now: an echo goes with it, or nobody who beats is there. A
         long wait for a beat is reported once.
         """
-        self.settle()
+        if not self._is_settled:
+            self.settle()
         if not self.awaited:
             self._waits_since, self._has_reported = None, False
             return True

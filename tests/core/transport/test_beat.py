@@ -22,11 +22,12 @@ FORWARD = Twist.planar(0.3)
 
 
 @contextmanager
-def beating(beat: Beat) -> Iterator[None]:
-    """Within this block a loop polls the beat."""
+def beating(beat: Beat, after: float = 0.0) -> Iterator[None]:
+    """Within this block a loop polls the beat, from so many seconds on."""
     ends = Event()
 
     def run() -> None:
+        ends.wait(after)
         while not ends.wait(0.005):
             beat.poll()
 
@@ -174,6 +175,17 @@ def test_without_a_beat_only_stops_are_sent_which_is_reported(
         wait_for(lambda: forward(commands) and robot.commands.try_recv())
     assert commands.echoes and commands.echoes.heard
     assert capsys.readouterr().err == ""
+
+
+def test_who_waits_again_hears_a_receiver_that_came_meanwhile(wire: Wire) -> None:
+    sender = wire.bus("sender").publisher("cmd_vel", Twist)
+    assert sender.echoes
+    sender.echoes.settle()
+    robot = Receiver(wire)
+    wait_for(lambda: sender.matched, what="a link")
+    with beating(robot.beat, after=0.2):
+        sender.echoes.settle(10.0)
+        assert sender.echoes.heard
 
 
 def test_commands_are_numbered_from_the_first_that_a_robot_may_have_heard(wire: Wire) -> None:
