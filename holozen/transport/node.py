@@ -405,14 +405,9 @@ class Node:
             # for 256 replies.
             replies: Any = zenoh.handlers.FifoChannel(MAX_TOKENS)
             timeout, began = max(ROLL_CALL, self.took), time.monotonic()
-            try:
-                asked = live.get(keys, replies, timeout=timeout)
-            except zenoh.ZError:
-                if self._closing.is_set():  # by another thread
-                    raise BusError("closed") from None
-                raise
-            for _ in asked:
-                pass
+            with one_line(f"key {keys!r}"):  # such as of a session that another thread has closed
+                for _ in live.get(keys, replies, timeout=timeout):
+                    pass
             return time.monotonic() - began < timeout
 
         return Graph(
