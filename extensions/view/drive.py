@@ -200,7 +200,7 @@ class Driver:
             command = " ".join(filter(None, ("holozen controller", self.namespace, "--laps 0")))
             return f"it has no controller; `{command}` starts one"
         if echoes := self._goals.echoes:
-            echoes.settle(PATIENCE)  # of one that has just come, its subscription is known first
+            echoes.settle(PATIENCE)  # one may have come since
             if not echoes.may_command():
                 return "its controller was not heard yet; try it again in a moment"
         goal = in_odometry((x, y, true_pose.position.z), true_pose, odom.pose.pose)

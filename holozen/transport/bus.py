@@ -290,13 +290,15 @@ class Bus(Node):
         from holozen.messages import codec
 
         _check_types(key, *kinds or (None,))
+        # The token comes first: a sender that has a match knows whose beat to echo.
+        token = self.announce("sub", kinds[0].ROS, key)
         ring = self._ring(key, depth) if dealt else None
         raw = (
             self._keep(RawSubscriber(ring, limit))
             if ring
             else self.subscribe_raw(key, depth, limit)
         )
-        raw.ends.append(self.announce("sub", kinds[0].ROS, key))
+        raw.ends.append(token)
         is_command = wire.is_command(key, (kind.ROS for kind in kinds))
         decode = codec.decoder(kinds, tolerant=not is_command)
         return Subscription(

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import pairwise
 from threading import Event, Thread
 from typing import Any
@@ -186,6 +186,31 @@ def test_who_waits_again_hears_a_receiver_that_came_meanwhile(wire: Wire) -> Non
     with beating(robot.beat, after=0.2):
         sender.echoes.settle(10.0)
         assert sender.echoes.heard
+
+
+def test_who_has_a_match_knows_of_whom_to_expect_a_beat(
+    wire: Wire, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, driver = wire.bus("robot", lasting=True), wire.bus("driver")
+    commands, begins = driver.publisher("cmd_vel", Twist), Event()
+    wait_for(driver.connected, what="a link")
+    announce = robot.announce
+
+    def late(kind: str, *of: str) -> object:
+        """Announce a subscription when Zenoh has had time to tell of it."""
+        if kind == "sub":
+            begins.set()
+            with suppress(AssertionError):
+                wait_for(lambda: commands.matched, 0.3)
+        return announce(kind, *of)
+
+    monkeypatch.setattr(robot, "announce", late)
+    robot.beat()
+    subscribing = Thread(target=robot.subscribe, args=("cmd_vel", Twist))
+    subscribing.start()
+    wait_for(lambda: begins.is_set() and commands.matched, what="a match")
+    assert commands.echoes and commands.echoes.has_receiver
+    subscribing.join()
 
 
 def test_commands_are_numbered_from_the_first_that_a_robot_may_have_heard(wire: Wire) -> None:
