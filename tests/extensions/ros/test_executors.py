@@ -101,11 +101,17 @@ def test_shutdown_in_a_callback_ends_the_spin_quietly(ros: Wire) -> None:
 
 def test_shutdown_from_elsewhere_ends_the_spin_with_a_word(ros: Wire) -> None:
     node, context = rclpy.create_node("tom"), rclpy.get_default_context()
-    rclpy.get_global_executor().create_task(
-        lambda: threading.Timer(0.01, context.try_shutdown).start()
-    )
+    executor = rclpy.get_global_executor()
+
+    def end() -> None:
+        wait_for(lambda: executor.waker.waiting, what="the spin to wait")
+        context.try_shutdown()
+
+    elsewhere = threading.Thread(target=end)
+    elsewhere.start()
     with pytest.raises(ExternalShutdownException):
         rclpy.spin(node)
+    elsewhere.join()
 
 
 def test_an_executor_that_is_shut_down_spins_no_more(ros: Wire) -> None:
