@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, sync_playwright
 
+from holozen.messages import Odometry
 from holozen.testing import Process, Wire, wait_for
-
-SOFTWARE_WEBGL = ("--enable-unsafe-swiftshader",)
+from holozen.transport.pubsub import Latest
 
 TOKEN = "sesame"
 
@@ -36,6 +36,20 @@ def view(town: Wire) -> str:
     return address(town.start("view", "--port", "0", "--token", TOKEN))
 
 
+@pytest.fixture(scope="module")
+def sim(town: Wire) -> Process:
+    sim = town.start("sim")
+    sim.wait_for_line("listens on")
+    return sim
+
+
+@pytest.fixture(scope="module")
+def odom(town: Wire, sim: Process) -> Latest[Odometry]:
+    latest = town.bus("witness").latest("odom", Odometry)
+    wait_for(lambda: latest.count, what="odom")
+    return latest
+
+
 def address(view: Process) -> str:
     """The address that a view prints."""
     view.wait_for_line("http://")
@@ -50,11 +64,16 @@ def is_soon(condition: Callable[[], bool]) -> bool:
 
 
 @pytest.fixture(scope="module")
-def chromium(request: pytest.FixtureRequest) -> Iterator[Browser]:
-    """A browser; one that draws in 3D, which takes it long, for a module with WEBGL = True."""
+def flags() -> tuple[str, ...]:
+    """Flags of the browser beside the usual ones."""
+    return ()
+
+
+@pytest.fixture(scope="module")
+def chromium(flags: tuple[str, ...]) -> Iterator[Browser]:
+    """A browser for the tests of a file."""
     path = shutil.which("chromium")
     assert path, "the mark `needs` has installed it"
-    flags = SOFTWARE_WEBGL if getattr(request.module, "WEBGL", False) else ()
     with sync_playwright() as playwright:
         # A container's root has no sandbox; only our own page is opened.
         browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox", *flags])
