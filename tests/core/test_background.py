@@ -32,8 +32,9 @@ def test_an_interrupted_waiter_may_wait_again() -> None:
     result = background(lambda: go.wait(10))
     # other tests may have left theirs
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    threading.Timer(0.05, signal.pthread_kill, (threading.get_ident(), signal.SIGINT)).start()
+    interrupt = threading.Timer(0.05, signal.pthread_kill, (threading.get_ident(), signal.SIGINT))
     with pytest.raises(KeyboardInterrupt):
+        interrupt.start()
         result()
     signal.signal(signal.SIGINT, before)
     go.set()

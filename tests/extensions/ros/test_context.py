@@ -286,7 +286,12 @@ def test_a_signal_ends_every_wait(script: Script) -> None:
             "in mine\n    def mine(): 1 / 0",
         ),
         ("node.create_timer(0.1, rclpy.shutdown)\nrclpy.spin(node)", 0, ""),
-        ("threading.Timer(0.05, rclpy.shutdown).start()\nrclpy.spin(node)", 0, ""),
+        (
+            "def elsewhere(): timer.cancel(), threading.Thread(target=rclpy.shutdown).start()\n"
+            "timer = node.create_timer(0.01, elsewhere)\nrclpy.spin(node)",
+            0,
+            "",
+        ),
         ("node.create_client(Trigger, 'nobody').call_async(Trigger.Request())", 0, ""),
         ("threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()\nup()", 0, None),
         (HALF_STARTED, 130, ""),
