@@ -106,7 +106,7 @@ def test_a_gamepad_drives_and_has_to_be_let_go_after_a_stop(
     stops_near(odom, place(odom))
     assert stays(odom), "it is still pushed"
     page.evaluate(GAMEPAD, [0, 0, 0, 0])
-    page.wait_for_function("looks > 0")
+    wait_for(lambda: page.evaluate("looks > 0"), what="the page to look")
     page.evaluate(GAMEPAD, [0, 0, 0.8, 0])
     wait_for(lambda: has_signs(odom, (0, 0, -1)), what="the robot to turn right")
     page.evaluate(GAMEPAD, None)
