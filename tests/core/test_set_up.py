@@ -19,7 +19,7 @@ case "$*" in
   *-venv*) echo python3.{minor}-venv; exit ;;
   --version) echo "Python 3.{minor}.1"; exit ;;
 esac
-echo "made by 3.{minor}: $*" >&2; exit 1
+echo "made by 3.{minor}: $0 $*" >&2; exit 1
 """
 UV = '#!/bin/sh\necho "made by uv: $*" >&2; exit 1\n'
 SetUp = Callable[..., str]
@@ -27,15 +27,17 @@ SetUp = Callable[..., str]
 
 @pytest.fixture
 def set_up(tmp_path: Path) -> SetUp:
-    """`set_up(system, {name: minor version}, *programs)`: the last line of a set-up there, which
-    ends after the choice.
+    """`set_up(system, {name: minor version}, uv, shims)`: the last line of a set-up there, which
+    ends after the choice. `shims` are Pythons of pyenv, before the others in PATH.
 
     A Python with a version below zero has no ensurepip.
     """
 
-    def run(system: str, pythons: dict[str, int], uv: bool = False) -> str:
-        tree, path = tmp_path / "tree", tmp_path / "bin"
-        for folder in (tree / "scripts", path):
+    def run(
+        system: str, pythons: dict[str, int], uv: bool = False, shims: dict[str, int] = {}
+    ) -> str:
+        tree, path, of_pyenv = tmp_path / "tree", tmp_path / "bin", tmp_path / "pyenv" / "shims"
+        for folder in (tree / "scripts", path, of_pyenv):
             shutil.rmtree(folder, ignore_errors=True)
             folder.mkdir(parents=True)
         for name in ("scripts/venv", "pyproject.toml", "requirements.lock"):
@@ -45,12 +47,16 @@ def set_up(tmp_path: Path) -> SetUp:
             assert found
             (path / command).symlink_to(found)
         programs = {"uname": f"#!/bin/sh\necho {system}\n"} | ({"uv": UV} if uv else {})
-        for name, minor in pythons.items():
-            programs[name] = PYTHON.format(minor=abs(minor), venv="true" if minor > 0 else "false")
-        for name, text in programs.items():
-            (path / name).write_text(text)
-            (path / name).chmod(0o755)
-        env = {"PATH": str(path), "TMPDIR": os.environ.get("TMPDIR", "/tmp")}
+        files = {path / name: text for name, text in programs.items()}
+        for folder, there in ((path, pythons), (of_pyenv, shims)):
+            for name, minor in there.items():
+                files[folder / name] = PYTHON.format(
+                    minor=abs(minor), venv="true" if minor > 0 else "false"
+                )
+        for file, text in files.items():
+            file.write_text(text)
+            file.chmod(0o755)
+        env = {"PATH": f"{of_pyenv}:{path}", "TMPDIR": os.environ.get("TMPDIR", "/tmp")}
         done = subprocess.run(
             [path / "bash", tree / "scripts" / "venv"], env=env, capture_output=True, text=True
         )
@@ -65,14 +71,22 @@ ALL = {"python3": 12, "python3.11": 11, "python3.12": 12, "python3.13": 13, "pyt
 
 
 def test_it_takes_3_11_where_pybullet_has_a_wheel_and_the_newest_elsewhere(set_up: SetUp) -> None:
-    assert set_up(PC, ALL).startswith("made by 3.11: -m venv")
-    assert set_up(PI, ALL).startswith("made by 3.14: -m venv")
-    assert set_up(MAC, {"python3": 12}).startswith("made by 3.12: -m venv")
-    assert set_up(PC, {"python3": 10, "python3.13": 13}).startswith("made by 3.13: -m venv")
+    assert set_up(PC, ALL).startswith("made by 3.11: ")
+    assert set_up(PI, ALL).startswith("made by 3.14: ")
+    assert set_up(MAC, {"python3": 12}).startswith("made by 3.12: ")
+    assert set_up(PC, {"python3": 10, "python3.13": 13}).startswith("made by 3.13: ")
+
+
+def test_of_one_version_it_takes_the_systems_before_that_of_pyenv(set_up: SetUp) -> None:
+    pyenv = {"python3.11": 11, "python3.12": 12}
+    assert "/bin/python3.11 -m venv" in set_up(PC, ALL, shims=pyenv)
+    assert "/shims/python3.11 -m venv" in set_up(PC, {"python3": 12}, shims=pyenv)
+    assert "/shims/python3.11 -m venv" in set_up(PC, {"python3.11": -11}, shims=pyenv)
+    assert "/bin/python3.11 .venv" in set_up(PC, {"python3.11": -11}, uv=True, shims=pyenv)
 
 
 def test_with_uv_it_uses_that_and_lets_it_get_a_python_if_there_is_none(set_up: SetUp) -> None:
-    assert "--python python3.13 .venv" in set_up(PC, {"python3.13": -13}, uv=True)
+    assert "/python3.13 .venv" in set_up(PC, {"python3.13": -13}, uv=True)
     assert "--python 3.11 .venv" in set_up(PC, {"python3": 10}, uv=True)
     assert "--python 3.14 .venv" in set_up(MAC, {}, uv=True)
 

@@ -9,8 +9,6 @@ import pytest
 from holozen.messages import Odometry
 from holozen.testing import Wire, wait_for
 
-pytest.importorskip("ctypes.macholib", reason="not built: Debian 13 leaves this part of Python out")
-
 LACKS = """
 import ctypes, fcntl, os, signal, sys, time
 
@@ -21,6 +19,8 @@ for module, names in (
     for name in names.split():
         if hasattr(module, name):
             delattr(module, name)
+
+import ctypes.util  # before the platform has another name, with which it needs what Debian leaves out
 
 def watch(event, arguments):
     if event in ("open", "os.listdir") and str(arguments[0]).startswith("/proc"):
