@@ -23,7 +23,8 @@ from holozen.transport.graph import Endpoint, includes, on_key
 from holozen.transport.pubsub import RawPublisher
 
 STOPS, STOP_EVERY = 5, 0.02  # s; several stops, since a congested link may drop some
-SETTLE = 0.3  # s for subscribers to match, so that they receive the first messages
+SETTLE = 0.3  # s for subscribers to match of which none is announced, such as foreign ones
+LINK_WAIT = 2.0  # s for those to match that are announced; they would miss the first messages
 BEAT_WAIT = 2.0  # s for a robot's first beat; the commands before it would be lost
 LOOK = 0.05  # s between two polls of the keyboard and of `stop`
 GAP = 0.5  # s between two looks; after more the process was suspended
@@ -37,7 +38,8 @@ COMMANDS = tuple(map(named, sorted(wire.COMMAND_TYPES)))
 
 class Plan(NamedTuple):
     """Channels and the keys they are played on; `commands` are those of the keys that move robots,
-    with the type that their commands are sent as. `moves`: commands are played.
+    with the type that their commands are sent as. `moves`: commands are played. `read` are the keys
+    that have subscribers in the graph.
     """
 
     targets: dict[Channel, str]
@@ -45,6 +47,7 @@ class Plan(NamedTuple):
     left_out: dict[str, str]  # key in the bag -> reason
     published: dict[str, str]  # keys left out because they have a publisher -> its node
     moves: bool
+    read: set[str]
 
 
 def plan(
@@ -62,7 +65,7 @@ def plan(
     """
     channels = sorted(channels)
     _check_known(topics or [], remap, channels)
-    made = Plan({}, {}, {}, {}, commands)
+    made = Plan({}, {}, {}, {}, commands, set())
     for channel in channels:
         asked = channel.key in (topics or ()) or channel.key in remap
         if topics and not any(includes(one, channel.key) for one in topics):
@@ -79,6 +82,8 @@ def plan(
                 made.published[channel.key] = nodes
             continue
         made.targets[channel] = target
+        if on_key(endpoints, target, "sub"):
+            made.read.add(target)
         if command:
             made.commands[target] = command
     return made
@@ -173,18 +178,23 @@ class Outlet:
         }
 
     def settle(self) -> None:
-        """Wait briefly for subscribers, then for the beats of the robots that commands are for: on
-        a busy machine their links may still be being made.
+        """Wait for the subscribers in the graph to match, and briefly for others; then for the
+        beats of the robots that commands are for: on a busy machine their links may still be being
+        made.
         """
-        deadline = time.monotonic() + SETTLE
-        while time.monotonic() < deadline and not self._is_matched():
+        start = time.monotonic()
+        while not self._is_matched(time.monotonic() - start):
             time.sleep(0.005)
         for route in self._routes.values():
             if route.publisher.echoes:
                 route.publisher.echoes.settle(BEAT_WAIT)
 
-    def _is_matched(self) -> bool:
-        return any(route.publisher.matched for route in self._routes.values())
+    def _is_matched(self, waited: float) -> bool:
+        """Whether those match that are awaited, or were for long enough. `waited` in s."""
+        routes = self._routes.values()
+        if awaited := [one.publisher for one in routes if one.key in self._plan.read]:
+            return waited > LINK_WAIT or all(one.matched for one in awaited)
+        return waited > SETTLE or any(one.publisher.matched for one in routes)
 
     def publish(self, message: Message) -> bool:
         """Send a message, if its channel is in the plan. Returns whether it was sent: a channel is

@@ -5,12 +5,14 @@ the end.
 import json
 import re
 import signal
+import threading
 import time
 from pathlib import Path
 
 import pytest
 
 from holozen.bags.formats import format_of
+from holozen.bags.player import SETTLE
 from holozen.bags.writer import BagWriter
 from holozen.messages import (
     Header,
@@ -118,6 +120,27 @@ def test_a_recording_is_played_to_a_second_recorder(verb: Verb, wire: Wire, tmp_
     assert found == sorted(found)
     assert set(found) <= set(range(100, 200))  # Zenoh drops some on a machine that is too busy
     assert found
+
+
+def test_a_reader_that_is_in_the_graph_is_waited_for(
+    verb: Verb, wire: Wire, tmp_path: Path
+) -> None:
+    bus, graph = wire.bus(), wire.bus("witness").graph()
+    token = bus.announce("sub", "any/msg/Any", "a")
+    taps: list[RawSubscriber] = []
+
+    def read_late() -> None:
+        wait_for(lambda: on_key(graph.endpoints(), "a", "pub"), what="the player")
+        threading.Event().wait(2 * SETTLE)  # longer than any other subscriber is waited for
+        taps.append(bus.subscribe_raw("a"))
+
+    late = threading.Thread(target=read_late)
+    late.start()
+    done = verb(wire, "replay", bag(tmp_path / "a.mcap", ("a", b"hello", "text/plain", 0.0)))
+    late.join()
+    assert done.returncode == 0, done.stderr
+    assert [s.payload for s in heard(taps[0], count=1)] == [b"hello"]
+    token.undeclare()
 
 
 def test_beside_a_live_robot_nothing_is_played_that_could_disturb_it(
