@@ -157,7 +157,7 @@ class Reader:
 
     def begin(self, lines: list[str], started: list[Terminal]) -> None:
         """Run a command a line; those that go on are `started`, and have begun before one that ends
-        is run.
+        is run. A router has begun before the next: a sim that is faster may take its port.
         """
         begun = list[tuple[Terminal, Sequence[str], float]]()
         for text in [*lines, ""]:
@@ -172,7 +172,7 @@ class Reader:
                 said = OF_A_SIM if "holozen sim" in line else ANYTHING
                 moment = MOMENT if said is ANYTHING else WITHIN
                 begun.append((started[-1], said, time.monotonic() + moment))
-            while begun and (" record " in line or not goes_on):
+            while begun and (" record " in line or " router " in line or not goes_on):
                 terminal, said, until = begun.pop(0)
                 wait_for(partial(speaks, terminal, said, until), 2 * WITHIN)
             if " record " in line:
