@@ -71,7 +71,8 @@ def plan(
         if topics and not any(includes(one, channel.key) for one in topics):
             continue
         target = remap.get(channel.key, channel.key)
-        command = _command_type(channel, target, endpoints)
+        readers = on_key(endpoints, target, "sub")
+        command = _command_type(channel, target, readers)
         nodes = "" if command else _publishers(target, endpoints)
         if why := _why_not(target, bool(command) and not commands, nodes):
             if asked:
@@ -82,7 +83,7 @@ def plan(
                 made.published[channel.key] = nodes
             continue
         made.targets[channel] = target
-        if on_key(endpoints, target, "sub"):
+        if readers:
             made.read.add(target)
         if command:
             made.commands[target] = command
@@ -96,11 +97,11 @@ def _check_known(topics: list[str], remap: Mapping[str, str], channels: list[Cha
             raise BagError(f"there is no {one!r} in the bag; it has {known}")
 
 
-def _command_type(channel: Channel, target: str, endpoints: list[Endpoint]) -> str:
+def _command_type(channel: Channel, target: str, readers: list[Endpoint]) -> str:
     """The type of its commands if it may move a robot, judged by its key in the bag or here, its
-    type, or the key's subscribers; else empty.
+    type, or the key's `readers`; else empty.
     """
-    types = [channel.type, *sorted(endpoint.type for endpoint in on_key(endpoints, target, "sub"))]
+    types = [channel.type, *sorted(reader.type for reader in readers)]
     if not any(wire.is_command(key, types) for key in (channel.key, target)):
         return ""
     return next((name for name in types if name in wire.COMMAND_TYPES), "") or channel.type or ANY
