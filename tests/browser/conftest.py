@@ -5,13 +5,14 @@ from collections.abc import Callable, Generator, Iterator
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 
 from holozen.messages import Odometry
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.pubsub import Latest
 
 TOKEN = "sesame"
+Open = Callable[..., Page]
 
 
 @pytest.hookimpl(wrapper=True)
@@ -54,6 +55,14 @@ def address(view: Process) -> str:
     """The address that a view prints."""
     view.wait_for_line("http://")
     return next(word for word in view.err.split() if word.startswith("http://"))
+
+
+def watched(context: BrowserContext, faults: list[str]) -> Page:
+    """A new page, whose errors are added to `faults`."""
+    page = context.new_page()
+    page.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    return page
 
 
 def is_soon(condition: Callable[[], bool]) -> bool:

@@ -81,3 +81,10 @@ def hold(page: Page, key: str, odom: Latest[Odometry]) -> None:
             return False
 
     wait_for(tried, 20, f"{key} to move the robot")
+
+
+def tap(page: Page, key: str, odom: Latest[Odometry]) -> None:
+    """Hold a key until it moves the robot, let go, and wait for rest."""
+    hold(page, key, odom)
+    page.keyboard.up(key)
+    wait_for(lambda: stands(odom), what="rest")

@@ -1,6 +1,6 @@
 """The page of `holozen view` as one drives from it, with one sim for the tests of a file."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -8,12 +8,10 @@ from playwright.sync_api import Browser, BrowserContext, Page
 
 from holozen.testing import Process
 
+from ..conftest import Open, watched
 from ..driving import KEYS
 
 DESK = {"width": 1280, "height": 800}
-
-
-Open = Callable[..., Page]
 
 
 def new_page(chromium: Browser, faults: list[str], **options: Any) -> Page:
@@ -25,10 +23,7 @@ def new_page(chromium: Browser, faults: list[str], **options: Any) -> Page:
         "**/scene/**",
         lambda route: route.fulfill(body="<title>a scene</title>", content_type="text/html"),
     )
-    page = context.new_page()
-    page.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
-    page.on("pageerror", lambda error: faults.append(str(error)))
-    return page
+    return watched(context, faults)
 
 
 def load(page: Page, address: str, ready: str = "hb_bot") -> None:

@@ -22,7 +22,7 @@ from holozen.testing import Wire, wait_for
 from holozen.transport.pubsub import Latest
 from tests.faults.proxy import Proxy
 
-from ..conftest import TOKEN, address, is_soon
+from ..conftest import TOKEN, Open, address, is_soon
 from ..driving import (
     FARTHEST,
     HALF_A_SECOND,
@@ -32,9 +32,9 @@ from ..driving import (
     stands,
     stays,
     stops_near,
+    tap,
     velocity,
 )
-from .conftest import Open
 
 pytestmark = [pytest.mark.needs("chromium"), pytest.mark.alone]
 
@@ -65,9 +65,7 @@ def test_a_hold_ends_with(what: str, page: Page, odom: Latest[Odometry]) -> None
     page.keyboard.down("w")  # as the keyboard repeats
     assert stays(odom), "what is still held moves nothing"
     page.keyboard.up("w")
-    hold(page, "w", odom)
-    page.keyboard.up("w")
-    wait_for(lambda: stands(odom), what="rest")
+    tap(page, "w", odom)
 
 
 def test_a_renderer_that_is_suspended_stops_the_robot_which_does_not_go_on_by_itself(

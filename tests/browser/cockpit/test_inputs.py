@@ -13,9 +13,8 @@ from holozen.spawning import SpawnPose, put, read, spawn_file
 from holozen.testing import Wire, wait_for
 from holozen.transport.pubsub import Latest
 
-from ..conftest import address
-from ..driving import KEYS, MOVES, has_signs, hold, place, stands, stays, stops_near, velocity
-from .conftest import Open
+from ..conftest import Open, address
+from ..driving import KEYS, MOVES, has_signs, hold, place, stands, stays, stops_near, tap, velocity
 
 pytestmark = [pytest.mark.needs("chromium"), pytest.mark.alone]
 
@@ -120,9 +119,7 @@ def test_a_click_into_the_scene_lets_go_and_gives_the_keys_back(
     page.mouse.click(640, 300)
     stops_near(odom, place(odom))
     page.keyboard.up("w")
-    hold(page, "d", odom)
-    page.keyboard.up("d")
-    wait_for(lambda: stands(odom), what="rest")
+    tap(page, "d", odom)
 
 
 def test_an_old_picture_is_covered_and_who_drives_by_it_stops(

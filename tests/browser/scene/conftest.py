@@ -1,6 +1,6 @@
 """What the page of `holozen view` draws, with one sim and one page for the tests of a file."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -11,6 +11,7 @@ from holozen.messages import Odometry
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.pubsub import Latest
 
+from ..conftest import Open, watched
 from .pixels import DECK_HEIGHT, EXACT, SIZE, TOP, shows_it_at
 
 SOFTWARE_WEBGL = "--enable-unsafe-swiftshader"
@@ -37,9 +38,6 @@ def bus(town: Wire) -> Bus:
     return town.bus()
 
 
-Open = Callable[..., Page]
-
-
 @pytest.fixture(scope="module")
 def opened(chromium: Browser, view: str, sim: Process) -> Iterator[Open]:
     """Opens pages, as a phone or not, and waits until they show a robot. None loads anything from
@@ -54,12 +52,7 @@ def opened(chromium: Browser, view: str, sim: Process) -> Iterator[Open]:
         viewport = SIZE | {"height": SIZE["height"] + TOP + DECK_HEIGHT}
         contexts.append(context := chromium.new_context(**{"viewport": viewport, **options}))
         context.add_init_script(FEW_FRAMES)
-        page = context.new_page()
-        page.on(
-            "console",
-            lambda reported: faults.append(reported.text) if reported.type == "error" else None,
-        )
-        page.on("pageerror", lambda error: faults.append(str(error)))
+        page = watched(context, faults)
         inner = (own, "blob:", "data:")
         page.on(
             "request", lambda sent: None if sent.url.startswith(inner) else faults.append(sent.url)

@@ -32,9 +32,8 @@ from holozen.testing import Wire, wait_for
 from holozen.transport.pubsub import Latest
 from tests.extensions.bags.bags import a_bag
 
-from ..conftest import address, is_soon
+from ..conftest import Open, address, is_soon
 from ..driving import place, stands
-from .conftest import Open
 from .pixels import NEAR, SIZE, choose, colored, deck, pixel, put, shows_it_at
 
 pytestmark = [pytest.mark.needs("chromium"), pytest.mark.alone]

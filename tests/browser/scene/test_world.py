@@ -17,7 +17,7 @@ from holozen.testing import Process, Wire, wait_for
 from holozen.transport.pubsub import Latest
 
 from ..conftest import is_soon
-from ..driving import hold, place, stands
+from ..driving import place, stands, tap
 from .pixels import NEAR, SIZE, TOP, choose, colored, deck, pixel, put, shows_it_at
 
 pytestmark = [pytest.mark.needs("chromium"), pytest.mark.alone]
@@ -119,9 +119,7 @@ def test_a_robot_is_moved_to_where_one_clicks(page: Page, odom: Latest[Odometry]
 def test_a_goal_that_is_set_by_a_click_on_the_ground_is_reached(
     page: Page, town: Wire, bus: Bus, odom: Latest[Odometry]
 ) -> None:
-    hold(page, "a", odom)
-    page.keyboard.up("a")
-    wait_for(lambda: stands(odom), what="rest")
+    tap(page, "a", odom)
     controller = town.start("controller", "--laps", "0")
     wait_for(lambda: any(one.node == "controller" and one.kind == "sub" for one in bus.endpoints()))
     page.get_by_role("button", name="Set a goal").click()
