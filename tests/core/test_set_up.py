@@ -19,7 +19,7 @@ case "$*" in
   *-venv*) echo python3.{minor}-venv; exit ;;
   --version) echo "Python 3.{minor}.1"; exit ;;
 esac
-echo "made by 3.{minor}: $0 $*" >&2; exit 1
+echo "made by 3.{minor}: $* ($0)" >&2; exit 1
 """
 UV = '#!/bin/sh\necho "made by uv: $*" >&2; exit 1\n'
 SetUp = Callable[..., str]
@@ -71,22 +71,29 @@ ALL = {"python3": 12, "python3.11": 11, "python3.12": 12, "python3.13": 13, "pyt
 
 
 def test_it_takes_3_11_where_pybullet_has_a_wheel_and_the_newest_elsewhere(set_up: SetUp) -> None:
-    assert set_up(PC, ALL).startswith("made by 3.11: ")
-    assert set_up(PI, ALL).startswith("made by 3.14: ")
-    assert set_up(MAC, {"python3": 12}).startswith("made by 3.12: ")
-    assert set_up(PC, {"python3": 10, "python3.13": 13}).startswith("made by 3.13: ")
+    assert set_up(PC, ALL).startswith("made by 3.11: -m venv")
+    assert set_up(PI, ALL).startswith("made by 3.14: -m venv")
+    assert set_up(MAC, {"python3": 12}).startswith("made by 3.12: -m venv")
+    assert set_up(PC, {"python3": 10, "python3.13": 13}).startswith("made by 3.13: -m venv")
 
 
-def test_of_one_version_it_takes_the_systems_before_that_of_pyenv(set_up: SetUp) -> None:
+def test_of_one_version_it_takes_the_systems_before_that_of_pyenv(
+    set_up: SetUp, tmp_path: Path
+) -> None:
     pyenv = {"python3.11": 11, "python3.12": 12}
-    assert "/bin/python3.11 -m venv" in set_up(PC, ALL, shims=pyenv)
-    assert "/shims/python3.11 -m venv" in set_up(PC, {"python3": 12}, shims=pyenv)
-    assert "/shims/python3.11 -m venv" in set_up(PC, {"python3.11": -11}, shims=pyenv)
-    assert "/bin/python3.11 .venv" in set_up(PC, {"python3.11": -11}, uv=True, shims=pyenv)
+    system, shim = (f"({tmp_path}/{folder}/python3.11)" for folder in ("bin", "pyenv/shims"))
+    assert set_up(PC, ALL, shims=pyenv).endswith(system)
+    assert set_up(PC, {"python3": 12}, shims=pyenv).endswith(shim)
+    assert set_up(PC, {"python3.11": -11}, shims=pyenv).endswith(shim)
+    with_uv = set_up(PC, {"python3.11": -11}, uv=True, shims=pyenv)
+    assert f"--python {tmp_path}/bin/python3.11 .venv" in with_uv
 
 
-def test_with_uv_it_uses_that_and_lets_it_get_a_python_if_there_is_none(set_up: SetUp) -> None:
-    assert "/python3.13 .venv" in set_up(PC, {"python3.13": -13}, uv=True)
+def test_with_uv_it_uses_that_and_lets_it_get_a_python_if_there_is_none(
+    set_up: SetUp, tmp_path: Path
+) -> None:
+    with_uv = set_up(PC, {"python3.13": -13}, uv=True)
+    assert f"--python {tmp_path}/bin/python3.13 .venv" in with_uv
     assert "--python 3.11 .venv" in set_up(PC, {"python3": 10}, uv=True)
     assert "--python 3.14 .venv" in set_up(MAC, {}, uv=True)
 
