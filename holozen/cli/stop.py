@@ -19,7 +19,7 @@ from holozen.transport.samples import Sample
 from holozen.transport.services import RepeatedRequest, refusal
 
 if TYPE_CHECKING:
-    from holozen.command.local_stop import LocalStop
+    from holozen.command.local_stop import Answers, LocalStop
     from holozen.messages import CommandStatus
     from holozen.transport.pubsub import Latest
     from holozen.transport.samples import Replies
@@ -39,8 +39,21 @@ NOTICE = 2.0  # s to discover the first robot, and those named on the command li
 
 def run(args: argparse.Namespace) -> int:
     """Stop or release robots; 0 only if all of them confirmed."""
+    from holozen.command.local_stop import Answers, stop_here  # not loaded by --help
+
     where = connection.from_arguments(args)
-    here = _stopped_here(args, where) if args.verb == "stop" else []
+    if args.verb == "release":
+        return _order(args, where, Answers())
+    with stop_here(where.networks, [name.strip("/") for name in args.robots], BY) as here:
+        return _order(args, where, here)
+
+
+def _order(args: argparse.Namespace, where: connection.Connection, here: "Answers") -> int:
+    """Order the robots elsewhere too, once those `here` had their time to answer."""
+    from holozen.command.local_stop import ANSWERS
+
+    for one in here.read(ANSWERS):
+        _print_here(args, one)
     try:
         with Bus(args.verb, where, patience=args.timeout) as bus:
             orders = Orders(bus, args, cli.began, here)
@@ -49,10 +62,12 @@ def run(args: argparse.Namespace) -> int:
             code = orders.report()
             silent = "" if orders.found else bus.silent()
     except BusError as error:
-        if not here:
+        for one in here.read():
+            _print_here(args, one)
+        if not here.received:
             raise Failure(f"no robot was reached: {error}") from None
         report(f"holozen stop: robots elsewhere were not reached: {error}")
-        names = {name for one in here if one.confirmed for name in (one.robot, one.name)}
+        names = {name for one in here.received if one.confirmed for name in (one.robot, one.name)}
         return int(not args.robots or not names.issuperset(name.strip("/") for name in args.robots))
     if not orders.found:
         reason = (
@@ -66,18 +81,13 @@ def run(args: argparse.Namespace) -> int:
     return code
 
 
-def _stopped_here(args: argparse.Namespace, where: connection.Connection) -> "list[LocalStop]":
-    """Stop the robots of this machine, without a network, and print each confirmation."""
-    from holozen.command.local_stop import stop_here  # not loaded by --help
-
-    found = stop_here(where.networks, [name.strip("/") for name in args.robots], BY)
-    for one in found:
-        order = Order(one.robot, "stop", cli.began)
-        order.confirmed, order.message = one.confirmed, one.message
-        if one.confirmed:
-            order.message = f"stopped by {BY}{one.message and '; '}{one.message}"
-        _print(args, order, one.name)
-    return found
+def _print_here(args: argparse.Namespace, one: "LocalStop") -> None:
+    """Print the answer for a robot of this machine."""
+    order = Order(one.robot, "stop", cli.began)
+    order.confirmed, order.message = one.confirmed, one.message
+    if one.confirmed:
+        order.message = f"stopped by {BY}{one.message and '; '}{one.message}"
+    _print(args, order, one.name)
 
 
 class Order:
@@ -162,10 +172,9 @@ def _read(payload: bytes, encoding: str) -> tuple[bool, str]:
 class Orders:
     """The requests to all robots, or to those that `args` name."""
 
-    def __init__(
-        self, bus: Bus, args: argparse.Namespace, began: float, here: "list[LocalStop]"
-    ) -> None:
+    def __init__(self, bus: Bus, args: argparse.Namespace, began: float, here: "Answers") -> None:
         self._bus, self._verb, self._args, self._began = bus, args.verb, args, began
+        self._here = here
         self._graph = bus.graph(TOKENS.format(verb=args.verb))
         self._wanted = {name.strip("/") for name in args.robots}
         # Those that are named, or else the robot at the root, are asked before they are discovered.
@@ -176,13 +185,25 @@ class Orders:
         self.found: set[str] = set()  # names of robots
         self._status: Latest[CommandStatus] | None = None  # of the robot at the root
         self._root = ""  # the name of the robot at the root, once it is known
-        for one in here:
-            self.found.add(one.robot)
-            if one.confirmed:
-                self._root = self._root or ("" if one.robot else one.name)
-                order = self._orders.setdefault(one.robot, Order(one.robot, args.verb, began))
-                order.confirmed = order.printed = True
-                order.here.add(one.session)
+        for one in here.received:
+            self._count(one)
+
+    def _count(self, one: "LocalStop") -> None:
+        """Count the answer, which was printed, for a robot of this machine."""
+        self.found.add(one.robot)
+        if one.confirmed:
+            self._root = self._root or ("" if one.robot else one.name)
+            order = self._orders.setdefault(one.robot, Order(one.robot, self._verb, self._began))
+            order.confirmed = order.printed = True
+            order.here.add(one.session)
+
+    def _read_here(self) -> None:
+        """Read what this machine answers late."""
+        for one in self._here.read():
+            order = self._orders.get(one.robot)
+            if not (order and order.printed):
+                _print_here(self._args, one)
+            self._count(one)
 
     def give(self) -> None:
         """Send the order to every robot as soon as it is discovered, and print each
@@ -191,6 +212,7 @@ class Orders:
         begin = changed = now = time.monotonic()
         while now - begin < self._args.timeout and not self._is_over(now - begin, now - changed):
             known = self._known()
+            self._read_here()
             self._find()
             changed = changed if self._known() == known else now
             for order in self._orders.values():

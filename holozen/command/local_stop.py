@@ -28,7 +28,8 @@ from holozen.transport.samples import Declared
 # below the folder of state that no flag changes: where a stop and a robot meet without one
 FOLDER = "local"
 HELD_UP = 0.3  # s without a pass of the loop after which a stop is answered for it
-# s for the processes of this machine to answer a stop; meanwhile those elsewhere are not asked
+# s for the processes of this machine to answer a stop; meanwhile those elsewhere are not asked.
+# What a busy machine answers later counts too.
 ANSWERS = 0.6
 LARGEST = 1 << 16  # bytes of a request, and of a reply
 HANGS = "its process hangs and drives nothing; it is still stopped when the process goes on"
@@ -174,14 +175,44 @@ class LocalStops(Declared):
         return [LocalStop(*one, self._session, confirmed, order.message) for one in robots]
 
 
-def stop_here(networks: Sequence[str], robots: Iterable[str], by: str) -> list[LocalStop]:
+class Answers:
+    """What the processes of this machine answer to a stop, of which `missing` have not answered.
+
+    received: all answers so far
+    """
+
+    def __init__(self, here: socket.socket | None = None, missing: int = 0) -> None:
+        self._socket, self._missing = here, missing
+        self.received: list[LocalStop] = []
+
+    def read(self, wait: float = 0.0) -> list[LocalStop]:
+        """The answers since the last call, and those that come within `wait` s until none is
+        missing.
+        """
+        deadline = time.monotonic() + wait
+        new: list[LocalStop] = []
+        while self._socket and self._missing:
+            self._socket.settimeout(max(deadline - time.monotonic(), 0.0))
+            try:
+                rows = json.loads(self._socket.recv(LARGEST))
+            except OSError:  # there is none yet
+                break
+            self._missing -= 1
+            new += [LocalStop(*row) for row in rows]
+        self.received += new
+        return new
+
+
+@contextlib.contextmanager
+def stop_here(networks: Sequence[str], robots: Iterable[str], by: str) -> Iterator[Answers]:
     """Stop `robots`, or all without any, of this user's processes on this machine that are in one
-    of the `networks`. Returns what those answered within ANSWERS; nothing where no process has a
-    socket.
+    of the `networks`. Answers can be read while the context lasts; there are none where no process
+    has a socket.
     """
     parent = default_folder()
     if not parent or not (parent / FOLDER).is_dir():
-        return []
+        yield Answers()
+        return
     try:
         folder = _own_folder(parent / FOLDER)
         path = folder / f"{os.getpid()}-{os.urandom(4).hex()}.reply"
@@ -191,7 +222,8 @@ def stop_here(networks: Sequence[str], robots: Iterable[str], by: str) -> list[L
             f"holozen stop: {parent / FOLDER}: {error.strerror or error}: stops go over the "
             "network alone"
         )
-        return []
+        yield Answers()
+        return
     mine = _from_here(networks)
     order = {"by": by, "robots": [*robots], "networks": sorted(mine), "reply": path.name}
     request = json.dumps(order).encode()
@@ -203,7 +235,7 @@ def stop_here(networks: Sequence[str], robots: Iterable[str], by: str) -> list[L
                 for one in sorted(folder.glob("*.stop"))
                 if not marks.isdisjoint(one.stem.split("-")[2:])
             ]
-            return list(_replies(here, sum(_ask(here, one, request) for one in there)))
+            yield Answers(here, sum(_ask(here, one, request) for one in there))
         finally:
             path.unlink(missing_ok=True)
 
@@ -236,18 +268,6 @@ def _ask(here: socket.socket, path: Path, request: bytes) -> bool:
     except OSError:  # it has just ended, or has a queue of stops already
         return False
     return True
-
-
-def _replies(here: socket.socket, count: int) -> Iterator[LocalStop]:
-    deadline = time.monotonic() + ANSWERS
-    while count and (left := deadline - time.monotonic()) > 0:
-        here.settimeout(left)
-        try:
-            rows = json.loads(here.recv(LARGEST))
-        except OSError:
-            return
-        count -= 1
-        yield from (LocalStop(*row) for row in rows)
 
 
 def _own_folder(path: Path) -> Path:

@@ -9,12 +9,15 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
 from holozen import cli
 from holozen.bus import Bus
 from holozen.cli import stop as stop_module
+from holozen.command import local_stop
+from holozen.command.local_stop import HANGS, LocalStops, Served
 from holozen.messages import CommandStatus, TriggerReply, TriggerRequest
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.process import PATIENCE
@@ -365,6 +368,21 @@ def test_without_a_router_it_reports_that(capsys: pytest.CaptureFixture[str]) ->
     out, err = capsys.readouterr()
     assert (code, out, err.count("\n")) == (1, "", 1)
     assert err.startswith("holozen stop: no robot was reached: cannot open Zenoh: ")
+
+
+def test_what_this_machine_answers_late_counts_as_the_network_does(
+    wire: Wire, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOLOZEN_STATE", str(tmp_path))
+    monkeypatch.setattr(local_stop, "ANSWERS", 0.0)
+    bus, served = wire.bus("sim"), [Served("Fred", "Fred")]
+    server = LocalStops(bus.id, bus.networks, lambda: served, None, stands=True, reporter="sim")
+    said = f"Fred is stopped: {HANGS}\n"
+    try:  # the network shows no robot
+        assert run("stop", "Fred") == (0, said, "")
+        assert run("stop", "Fred", "Bob", "--timeout", "3")[:2] == (1, said)
+    finally:
+        server.close()
 
 
 DEAF = """

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from holozen.command import local_stop
-from holozen.command.local_stop import HANGS, TURNS, LocalStop, LocalStops, Served, stop_here
+from holozen.command.local_stop import HANGS, TURNS, LocalStop, LocalStops, Served
 from holozen.command.outcome import UNKNOWN_CALLER
 
 Make = Callable[..., LocalStops]
@@ -27,8 +27,6 @@ def make(
     monkeypatch.setenv(
         "HOLOZEN_STATE", str(tmp_path / ("x" * 100 if request.param == "long" else "x"))
     )
-    # A busy machine may hold an answer up for longer than a person waits for it.
-    monkeypatch.setattr(local_stop, "ANSWERS", 60.0)
     made: list[LocalStops] = []
 
     def make(*robots: str, network: str = "here", stands: bool = True, **more: Any) -> LocalStops:
@@ -42,6 +40,12 @@ def make(
     yield make
     for one in made:
         one.close()
+
+
+def stop_here(networks: list[str], robots: list[str], by: str) -> list[LocalStop]:
+    """All answers, for which a busy machine may take long."""
+    with local_stop.stop_here(networks, robots, by) as answers:
+        return answers.read(60.0)
 
 
 def obey(server: LocalStops, orders: list[tuple[list[str], str]], end: threading.Event) -> None:
