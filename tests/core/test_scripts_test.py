@@ -11,7 +11,9 @@ from holozen.testing import wait_for
 
 REPO = Path(__file__).parents[2]
 WAITS = f"""#!{sys.executable}
-import os, pathlib, time
+import os, pathlib, signal, time
+if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # it is not ignored
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # which no sleep can overlook
 pathlib.Path("started", str(os.getpid())).touch()
 time.sleep(1000)
 """
@@ -51,7 +53,7 @@ def test_ctrl_c_while_the_tests_are_collected_leaves_no_process_behind(tmp_path:
         start_new_session=True,
     ) as script:
         try:
-            wait_for(lambda: len(started()) == 3, what="the check and both halves")
+            wait_for(lambda: len(started()) == 4, what="the check, both halves and the tables")
             os.killpg(script.pid, signal.SIGINT)  # as a terminal does
             wait_for(lambda: not any(map(is_alive, started())), what="their end")
         finally:
