@@ -25,7 +25,7 @@ from .motion import (
     stands,
 )
 
-pytestmark = [pytest.mark.alone, pytest.mark.needs("Xvfb", "kitty", "setxkbmap", "xdotool")]
+pytestmark = pytest.mark.needs("Xvfb", "kitty", "setxkbmap", "xdotool")
 
 V, W = 0.4, 0.8  # m/s, rad/s
 DIAGONAL = V / 2**0.5
