@@ -13,7 +13,7 @@ from holozen.cli.verb import Verb, by_name
 from holozen.console import Failure, printable, report, tell
 from holozen.flags import number
 from holozen.transport import connection
-from holozen.transport.errors import TIMEOUT, BusError
+from holozen.transport.errors import LONGEST_KEY, TIMEOUT, BusError
 from holozen.transport.graph import UNREACHED
 from holozen.transport.samples import Sample
 from holozen.transport.services import RepeatedRequest, refusal
@@ -62,8 +62,9 @@ def _order(args: argparse.Namespace, where: connection.Connection, here: "Answer
             code = orders.report()
             silent = "" if orders.found else bus.silent()
     except BusError as error:
-        for one in here.read():
+        for one in here.read(max(0.0, cli.began + args.timeout - time.monotonic())):
             _print_here(args, one)
+        _print_missing(args, here.missing())
         if not here.received:
             raise Failure(f"no robot was reached: {error}") from None
         report(f"holozen stop: robots elsewhere were not reached: {error}")
@@ -90,6 +91,13 @@ def _print_here(args: argparse.Namespace, one: "LocalStop") -> None:
     _print(args, order, one.name)
 
 
+def _print_missing(args: argparse.Namespace, pids: list[int]) -> None:
+    """Report the processes of this machine that have not answered."""
+    for pid in pids:
+        what = f"process {pid} of this machine did not answer within {args.timeout:g} s"
+        report(f"holozen stop: {what}; what it drives may move")
+
+
 class Order:
     """The request to one robot, repeated until every server of its key has confirmed it: two sims
     may share a key.
@@ -104,6 +112,7 @@ class Order:
         self.discovered = False
         self.servers: set[str] = set()  # their sessions
         self.here: set[str] = set()  # those that have confirmed without a network
+        self.hanging: set[str] = set()  # those that could not confirm so
         self.printed = False  # its confirmation
         self.message = ""
         self._replies: Replies | None = None
@@ -149,6 +158,8 @@ class Order:
 
 def _can_be_asked(name: str) -> bool:
     """Whether a name makes a key of one robot."""
+    if len(name) + len("/release") > LONGEST_KEY or not name.isprintable():
+        return False
     return not name or all(part and not set(part) & set("*$?#") for part in name.split("/"))
 
 
@@ -191,11 +202,14 @@ class Orders:
     def _count(self, one: "LocalStop") -> None:
         """Count the answer, which was printed, for a robot of this machine."""
         self.found.add(one.robot)
+        self._root = self._root or ("" if one.robot else one.name)
+        order = self._orders.setdefault(one.robot, Order(one.robot, self._verb, self._began))
         if one.confirmed:
-            self._root = self._root or ("" if one.robot else one.name)
-            order = self._orders.setdefault(one.robot, Order(one.robot, self._verb, self._began))
             order.confirmed = order.printed = True
             order.here.add(one.session)
+        else:
+            order.discovered, order.message = True, one.message
+            order.hanging.add(one.session)
 
     def _read_here(self) -> None:
         """Read what this machine answers late."""
@@ -242,6 +256,8 @@ class Orders:
                 f"holozen {self._verb}: there is no robot {', '.join(map(repr, missing))}; there "
                 f"are: {found}"
             )
+        unanswered = self._unanswered
+        _print_missing(self._args, unanswered)
         silent = self._report_silent()
         hidden = self._has_hidden
         if hidden:
@@ -249,7 +265,8 @@ class Orders:
                 f"holozen {self._verb}: other robots may not have been "
                 f"discovered{connection.FORBIDDEN}"
             )
-        return 1 if late or missing or silent or hidden or not self.found else 0
+        failed = late or missing or unanswered or silent or hidden or not self.found
+        return 1 if failed else 0
 
     def _report_silent(self) -> bool:
         """Report the robots of nodes that others know of, but that do not answer. Returns whether
@@ -271,7 +288,7 @@ class Orders:
 
     def _find(self) -> None:
         for order in self._orders.values():
-            order.servers.clear()
+            order.servers = {*order.hanging}
         for endpoint in self._graph.endpoints():
             robot = endpoint.key.removesuffix(self._verb).removesuffix("/")
             self.found.add(robot)
@@ -310,6 +327,11 @@ class Orders:
         """The names that no robot has."""
         return self._wanted - self.found - ({self._root} if "" in self.found else set())
 
+    @property
+    def _unanswered(self) -> list[int]:
+        """The pids of this machine that have not answered, and may have a robot to reach."""
+        return self._here.missing() if self._missing or not self._wanted else []
+
     def _known(self) -> tuple[int, int]:
         """The number of robots discovered, and of servers that the orders go to."""
         return len(self.found), sum(len(order.servers) for order in self._orders.values())
@@ -321,7 +343,7 @@ class Orders:
             return False
         if not self.found:  # among thousands of tokens, those of robots may come late
             return False
-        if self._has_hidden:
+        if self._has_hidden or self._unanswered:
             return False
         unnamed = self._wanted and "" in self.found and not self._root
         if self._missing or unnamed:

@@ -31,7 +31,7 @@ HELD_UP = 0.3  # s without a pass of the loop after which a stop is answered for
 # s for the processes of this machine to answer a stop; meanwhile those elsewhere are not asked.
 # What a busy machine answers later counts too.
 ANSWERS = 0.6
-LARGEST = 1 << 16  # bytes of a request, and of a reply
+LARGEST = 1 << 20  # bytes of a request, and of a reply: more than the kernel sends at once
 HANGS = "its process hangs and drives nothing; it is still stopped when the process goes on"
 TURNS = "its process hangs, and has no guard that stops its wheels: use the robot's own switch"
 
@@ -166,23 +166,25 @@ class LocalStops(Declared):
             return []
         order = Order(robots, by)
         self._waiting.append(order)
-        confirmed = True
-        if not order.done.wait(HELD_UP):
-            confirmed, order.message = self._stands, HANGS if self._stands else TURNS
-            if self._write:
-                for one in robots:
-                    self._write(one.robot, by)
-        return [LocalStop(*one, self._session, confirmed, order.message) for one in robots]
+        if not order.done.wait(HELD_UP) and self._write:
+            for one in robots:
+                self._write(one.robot, by)
+        if order.done.is_set():  # perhaps while that was written
+            confirmed, message = True, order.message
+        else:
+            confirmed, message = self._stands, HANGS if self._stands else TURNS
+        return [LocalStop(*one, self._session, confirmed, message) for one in robots]
 
 
 class Answers:
-    """What the processes of this machine answer to a stop, of which `missing` have not answered.
+    """What the processes of this machine answer to a stop, those whose sockets were `asked`.
 
     received: all answers so far
     """
 
-    def __init__(self, here: socket.socket | None = None, missing: int = 0) -> None:
-        self._socket, self._missing = here, missing
+    def __init__(self, here: socket.socket | None = None, asked: Iterable[Path] = ()) -> None:
+        self._socket = here
+        self._missing = {path.name: path for path in asked}
         self.received: list[LocalStop] = []
 
     def read(self, wait: float = 0.0) -> list[LocalStop]:
@@ -194,13 +196,18 @@ class Answers:
         while self._socket and self._missing:
             self._socket.settimeout(max(deadline - time.monotonic(), 0.0))
             try:
-                rows = json.loads(self._socket.recv(LARGEST))
+                answer, address = self._socket.recvfrom(LARGEST)
             except OSError:  # there is none yet
                 break
-            self._missing -= 1
-            new += [LocalStop(*row) for row in rows]
+            self._missing.pop(Path(address).name, None)
+            new += [LocalStop(*row) for row in json.loads(answer)]
         self.received += new
         return new
+
+    def missing(self) -> list[int]:
+        """The pids of those that have not answered, and still run."""
+        there = [name for name, path in self._missing.items() if not _is_gone(path)]
+        return [int(name.partition("-")[0]) for name in there]
 
 
 @contextlib.contextmanager
@@ -235,9 +242,10 @@ def stop_here(networks: Sequence[str], robots: Iterable[str], by: str) -> Iterat
                 for one in sorted(folder.glob("*.stop"))
                 if not marks.isdisjoint(one.stem.split("-")[2:])
             ]
-            yield Answers(here, sum(_ask(here, one, request) for one in there))
+            yield Answers(here, [one for one in there if _ask(here, one, request)])
         finally:
             path.unlink(missing_ok=True)
+            _remove_replies(folder)
 
 
 def _from_here(networks: Iterable[str]) -> set[str]:
@@ -256,7 +264,7 @@ def _mark(network: str) -> str:
 
 
 def _ask(here: socket.socket, path: Path, request: bytes) -> bool:
-    """Send a request; returns whether anyone may answer. Removes the socket of a process that has
+    """Send a request; returns whether the process is there. Removes the socket of one that has
     ended.
     """
     try:
@@ -265,9 +273,28 @@ def _ask(here: socket.socket, path: Path, request: bytes) -> bool:
     except ConnectionRefusedError:
         path.unlink(missing_ok=True)
         return False
-    except OSError:  # it has just ended, or has a queue of stops already
+    except BlockingIOError:  # it has a queue of stops already
+        return True
+    except OSError:  # it has just ended
         return False
     return True
+
+
+def _is_gone(path: Path) -> bool:
+    """Whether the process that has made a socket has closed it."""
+    try:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end, _address(path) as address:
+            end.connect(address)
+    except OSError:
+        return True
+    return False
+
+
+def _remove_replies(folder: Path) -> None:
+    """Remove what callers that were killed have left."""
+    for path in folder.glob("*.reply"):
+        if _is_gone(path):
+            path.unlink(missing_ok=True)
 
 
 def _own_folder(path: Path) -> Path:

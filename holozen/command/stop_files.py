@@ -6,6 +6,7 @@ import os
 import re
 import stat
 import threading
+import time
 import zlib
 from collections.abc import Iterable
 from pathlib import Path
@@ -58,6 +59,7 @@ class StopFiles:
         self._wanted: dict[str, str | None] = {}  # robot -> what is to be written
         self._failed: dict[str, str] = {}  # robot -> why that failed, or ""
         self._writer: threading.Thread | None = None
+        self._began = 0.0  # s, monotonic: when it began with a robot
 
     def paths(self, robot: str) -> list[Path]:
         """The files of a robot, one for each network; `robot` is empty for the one at the root."""
@@ -100,11 +102,11 @@ class StopFiles:
             return ""  # at each spawn of a robot that is not stopped, without the cost of a thread
         with self._lock:
             self._wanted[robot] = by
-            writer, hangs = self._writer, self._writer is not None
-            if writer is None:
+            if (writer := self._writer) is None:
+                self._began = time.monotonic()
                 writer = self._writer = threading.Thread(target=self._write_wanted, daemon=True)
                 writer.start()
-        writer.join(0 if hangs else HANGS)
+        writer.join(max(0.0, self._began + HANGS - time.monotonic()))
         if not writer.is_alive():
             return self._failed.pop(robot, "")
         reason = f"{self.paths(robot)[0]}: {HUNG_AT_RELEASE if by is None else HUNG}"
@@ -118,6 +120,7 @@ class StopFiles:
                     self._writer = None
                     return
                 robot, by = self._wanted.popitem()
+                self._began = time.monotonic()
             failed = self._write_files(robot, by)
             with self._lock:
                 self._failed[robot] = failed

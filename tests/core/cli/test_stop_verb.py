@@ -17,13 +17,13 @@ from holozen import cli
 from holozen.bus import Bus
 from holozen.cli import stop as stop_module
 from holozen.command import local_stop
-from holozen.command.local_stop import HANGS, LocalStops, Served
+from holozen.command.local_stop import HANGS, TURNS, LocalStops, Served
 from holozen.messages import CommandStatus, TriggerReply, TriggerRequest
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.process import PATIENCE
 from holozen.testing.wire import command
 from holozen.transport.connection import GROUP
-from holozen.transport.errors import ServiceError
+from holozen.transport.errors import BusError, ServiceError
 from holozen.transport.services import Server
 from holozen.wire import key_for
 
@@ -336,8 +336,11 @@ def test_a_name_that_does_not_exist_names_those_that_do(
 ) -> None:
     monkeypatch.setattr(stop_module, "NOTICE", 0.5)
     robots.add("Fred/stop", "stop")
-    reason = "there is no robot '**', 'Frd', 'a//b'; there are: the robot at the root, Fred"
-    wrong = ("Frd", "**", "a//b")
+    long = "x" * 1000  # with its service no key
+    reason = (
+        f"there is no robot '**', 'Frd', 'a//b', '{long}'; there are: the robot at the root, Fred"
+    )
+    wrong = ("Frd", "**", "a//b", long)
     assert run("stop", *wrong) == (1, "", f"holozen stop: {reason}\n")
     assert robots.called == set()
     assert run("stop", *wrong, "/Fred/") == (1, "Fred is stopped\n", f"holozen stop: {reason}\n")
@@ -370,19 +373,72 @@ def test_without_a_router_it_reports_that(capsys: pytest.CaptureFixture[str]) ->
     assert err.startswith("holozen stop: no robot was reached: cannot open Zenoh: ")
 
 
-def test_what_this_machine_answers_late_counts_as_the_network_does(
-    wire: Wire, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@contextmanager
+def hanging(wire: Wire, robot: str, *, stands: bool = True) -> Iterator[threading.Event]:
+    """A process of this machine whose loop does not go on, and which the network does not show. It
+    answers once the event is set.
+    """
+    bus, answers = wire.bus("sim"), threading.Event()
+
+    def robots() -> list[Served]:
+        answers.wait()
+        return [Served(robot, robot)]
+
+    server = LocalStops(bus.id, bus.networks, robots, None, stands=stands, reporter="sim")
+    try:
+        yield answers
+    finally:
+        answers.set()
+        server.close()
+
+
+@pytest.fixture
+def by_socket(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes of this machine meet by sockets of the test's own, and answer late."""
     monkeypatch.setenv("HOLOZEN_STATE", str(tmp_path))
     monkeypatch.setattr(local_stop, "ANSWERS", 0.0)
-    bus, served = wire.bus("sim"), [Served("Fred", "Fred")]
-    server = LocalStops(bus.id, bus.networks, lambda: served, None, stands=True, reporter="sim")
+
+
+def test_what_this_machine_answers_late_counts_as_the_network_does(
+    wire: Wire, run: Run, by_socket: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     said = f"Fred is stopped: {HANGS}\n"
-    try:  # the network shows no robot
+    with hanging(wire, "Fred") as answers:
+        answers.set()
         assert run("stop", "Fred") == (0, said, "")
         assert run("stop", "Fred", "Bob", "--timeout", "3")[:2] == (1, said)
-    finally:
-        server.close()
+
+        def refuse(*_: object, **_more: object) -> None:
+            raise BusError("the network is gone")
+
+        monkeypatch.setattr(stop_module, "Bus", refuse)  # at once, as where no socket can be had
+        elsewhere = "holozen stop: robots elsewhere were not reached: the network is gone\n"
+        assert run("stop", "Fred") == (0, said, elsewhere)
+
+
+def test_a_robot_of_this_machine_that_cannot_confirm_is_a_failure(
+    wire: Wire, run: Run, by_socket: None
+) -> None:
+    reason = f"holozen stop: Kiwi did not confirm within 3 s ({TURNS}); it may move\n"
+    with hanging(wire, "Kiwi", stands=False) as answers:
+        answers.set()
+        for names in ([], ["Kiwi"]):
+            code, out, err = run("stop", *names, "--timeout", "3")
+            assert (code, out) == (1, "") and err.endswith(reason), err
+
+
+def test_a_process_of_this_machine_that_does_not_answer_is_named_unless_others_are_meant(
+    robots: Robots, run: Run, by_socket: None
+) -> None:
+    robots.add("Ann/stop")
+    reason = f"process {os.getpid()} of this machine did not answer within 3 s; what it drives"
+    with hanging(robots.wire, "Fred"):
+        code, out, err = run("stop", "--timeout", "3")
+        assert (code, out) == (1, "Ann is stopped\n")
+        assert err == f"holozen stop: {reason} may move\n"
+        assert run("stop", "Ann") == (0, "Ann is stopped\n", "")
+    # it has ended
+    assert run("stop") == (0, "Ann is stopped\n", "")
 
 
 DEAF = """

@@ -102,6 +102,11 @@ def test_a_process_that_hangs_is_stopped_all_the_same_and_keeps_the_stop(make: M
     assert [order.by for server in (hung, turning) for order in server.take()] == ["Ann", "Ann"]
 
 
+def test_a_stop_that_is_obeyed_while_it_is_written_is_confirmed(make: Make) -> None:
+    one: LocalStops = make("Kiwi", stands=False, write=lambda _robot, _by: [*one.take()])
+    assert stop_here(["here"], [], "Ann") == [LocalStop("Kiwi", "Kiwi", "1a", True, "")]
+
+
 def test_a_stop_by_nobody_is_kept_as_a_stop(make: Make) -> None:
     written = list[str]()
     make("Fred", write=lambda _robot, by: written.append(by))
@@ -115,10 +120,11 @@ def test_nobody_else_can_reach_the_socket_and_none_is_left_behind(
     one = make("Fred")
     (path,) = (folder := Path(os.environ["HOLOZEN_STATE"], "local")).iterdir()
     assert [stat.S_IMODE(each.stat().st_mode) for each in (folder, path)] == [0o700, 0o600]
-    dead = folder / f"1-2-{path.stem.split('-')[2]}.stop"
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as killed, monkeypatch.context() as there:
-        there.chdir(folder)
-        killed.bind(dead.name)  # and nobody removes it
+    for dead in (f"1-2-{path.stem.split('-')[2]}.stop", "1-2.reply"):
+        killed = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        with killed, monkeypatch.context() as there:
+            there.chdir(folder)
+            killed.bind(dead)  # and nobody removes it
     stop_here(["here"], [], "Ann")
     one.close()
     assert [*folder.iterdir()] == []

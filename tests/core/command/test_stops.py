@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from holozen.command import stop_files
 from holozen.command.stop_files import UNREADABLE, StopFiles
 from holozen.testing import wait_for
 
@@ -134,6 +135,33 @@ def test_a_stop_that_is_set_again_is_written_again_if_its_file_is_gone(tmp_path:
         assert files.write("Fred", "ann@1") == ""
         (path,) = files.paths("Fred")
         path.unlink()
+
+
+def test_who_writes_while_another_does_waits_for_a_disk_that_works(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, goes_on, replace = threading.Event(), threading.Event(), Path.replace
+
+    def later(*paths: Path) -> Path:
+        begun.set()
+        goes_on.wait(30)
+        return replace(*paths)
+
+    monkeypatch.setattr(stop_files, "HANGS", 30.0)
+    monkeypatch.setattr(Path, "replace", later)
+    files, written = made(tmp_path), list[str]()
+    threads = [
+        threading.Thread(target=lambda name=name: written.append(files.write(name, "ann@1")))
+        for name in ("Fred", "Bob")
+    ]
+    threads[0].start()
+    begun.wait()
+    threads[1].start()
+    threads[1].join(0.1)  # it would end at once if it took the disk for hung
+    goes_on.set()
+    for thread in threads:
+        thread.join()
+    assert written == ["", ""]
 
 
 def test_a_disk_that_hangs_holds_up_no_stop_and_gets_the_last_state_once_it_goes_on(
