@@ -284,6 +284,7 @@ def _check_that_all_did(bus: Bus, did: int, sims: int) -> None:
     """
     if silent := silent_sims(bus):
         raise ServiceError(f"{', '.join(silent)} did not answer, {DONE}; {HANGS}")
+    sims = max(sims, len(bus.endpoints(SIMS)))  # one may have been heard of since
     if did < sims:
         raise ServiceError(f"{sims - did} of {sims} sims refused or did not answer, {DONE}")
 

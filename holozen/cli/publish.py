@@ -21,8 +21,7 @@ from holozen.bus import Bus
 from holozen.cli import values
 from holozen.cli.form import Form, form_of, form_of_listener
 from holozen.cli.hints import suggest_key
-from holozen.command.feedback import CommandFeedback
-from holozen.command.outcome import Outcome
+from holozen.command.feedback import LATE, CommandFeedback
 from holozen.console import Failure, report
 from holozen.fields import as_object
 from holozen.messages import WIRES, CodecError
@@ -187,9 +186,7 @@ class Sending:
         if again is None:
             return
         for _ in range(AGAIN):
-            if not feedback.refusal.startswith(Outcome.HELD_UP.value) or self._stop.wait(
-                AGAIN_AFTER
-            ):
+            if not feedback.refusal.startswith(LATE) or self._stop.wait(AGAIN_AFTER):
                 return
             seen = feedback.statuses
             self._send(again)

@@ -299,11 +299,8 @@ class Server(Declared):
         since after `event`, s of this process's monotonic clock; None never was. The caller may
         prove it better by what the error holds, as in `age`.
         """
-        if (
-            event is not None
-            and (age := self.age()) is not None
-            and time.monotonic() - age <= event
-        ):
+        now = time.monotonic()  # first: a process that hangs before the age is taken is stricter
+        if event is not None and (age := self.age()) is not None and now - age <= event:
             raise self._asks_again(refusal)
 
     def _asks_again(self, reason: str) -> ServiceError:

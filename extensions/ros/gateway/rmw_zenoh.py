@@ -23,7 +23,7 @@ from holozen.wire import ROS_TOPIC
 
 QOS = "::,10:,:,:,,"  # ROS 2's default: reliable, volatile, the last 10
 LATCHED_QOS = ":1:,1:,:,:,,"  # transient local, the last one
-PACE = 0.3  # s between two samples that show that their publisher keeps pace
+PACE = 0.6  # s between two samples that show that their publisher keeps pace
 # s; a sample that is faster by more than any before it shows that its sender's clock was set ahead
 JUMP = 0.5
 KINDS = {"MP": "pub", "MS": "sub", "SS": "srv"}
@@ -218,7 +218,7 @@ class Ages:
     def _measure_pace(self, sent: float, now: float) -> None:
         begun_sent, begun_now = self._begun or (sent, now)
         self.kept_pace = (
-            sent - begun_sent >= PACE and now - begun_now >= sent - begun_sent - PACE / 2
+            sent - begun_sent >= PACE and now - begun_now >= sent - begun_sent - PACE / 4
         )
         if self._begun is None or sent - begun_sent >= PACE:
             self._begun = sent, now

@@ -1,5 +1,6 @@
 """Timer: a callback at a fixed period of a clock. Rate: a sleep that keeps a loop at a rate."""
 
+import contextlib
 from collections.abc import Callable
 from typing import Any
 
@@ -7,7 +8,11 @@ from holozen.ros.catalog import HelpfulAttributes
 from holozen.ros.rclpy.callback_groups import CallbackGroup
 from holozen.ros.rclpy.clock import Clock
 from holozen.ros.rclpy.context import Context
-from holozen.ros.rclpy.exceptions import InvalidHandle, ROSInterruptException
+from holozen.ros.rclpy.exceptions import (
+    InvalidHandle,
+    NotInitializedException,
+    ROSInterruptException,
+)
 from holozen.ros.rclpy.waitable import Waitable
 
 __all__ = ["Rate", "Timer"]
@@ -126,15 +131,16 @@ class Rate(HelpfulAttributes):
 
         Raises ROSInterruptException when rclpy is shut down.
         """
-        if self._destroyed:
-            raise RuntimeError("Rate cannot sleep because it has been destroyed")
         if not self._context.ok():
             raise ROSInterruptException
+        if self._destroyed:
+            raise RuntimeError("Rate cannot sleep because it has been destroyed")
         now = self._clock.nanoseconds()
         # set back, or the loop was late
         if self._next - now > self._period or now - self._next > self._period:
             self._next = now if now > self._next else now + self._period
-        self._clock.sleep_nanoseconds(self._next, self._context, since=now)
+        with contextlib.suppress(NotInitializedException):  # shut down since
+            self._clock.sleep_nanoseconds(self._next, self._context, since=now)
         self._next += self._period
         if not self._context.ok():
             raise ROSInterruptException

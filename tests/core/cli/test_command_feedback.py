@@ -116,6 +116,28 @@ def once(
     return err
 
 
+@pytest.mark.parametrize("why", ["late", "old"])
+def test_a_single_command_that_was_held_up_is_sent_again(wire: Wire, run: Run, why: str) -> None:
+    sim = wire.bus("sim")
+    commands, statuses = (
+        sim.subscribe("cmd_vel", Twist),
+        sim.publisher("cmd_vel_status", CommandStatus),
+    )
+
+    def answer() -> None:
+        source = commands.recv().source
+        refused = CommandStatus(refused={why: 1}, last_refusal=f"{source}: {why}: send it again")
+        statuses.put(refused)
+        commands.recv()
+        statuses.put(CommandStatus(obeyed=source))
+
+    with ThreadPoolExecutor() as pool:
+        answered = pool.submit(answer)
+        code, _, err = run("topic", "pub", "cmd_vel", "{linear: {x: 0.2}}", "--once")
+        assert code == 0, err
+        answered.result(PATIENCE)
+
+
 def test_a_single_command_that_is_obeyed_is_not_called_refused(wire: Wire, run: Run) -> None:
     """It was, by a status that the sim had sent before the command came."""
     reported = once(
@@ -185,7 +207,7 @@ def test_a_stop_that_is_refused_where_nothing_drives_is_no_failure(wire: Wire, r
 def test_a_robot_that_is_gone_is_reported(
     wire: Wire, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("holozen.command.feedback.FRESH", 0.05)
+    monkeypatch.setattr("holozen.command.feedback.FRESH", 0.0)  # what came is old at each look
     sim = wire.bus("sim")
     commands, statuses = (
         sim.subscribe("cmd_vel", Twist),

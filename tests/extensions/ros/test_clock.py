@@ -25,7 +25,10 @@ from holozen.ros.rclpy.node import Node
 from holozen.ros.rclpy.parameter import Parameter
 from holozen.ros.rclpy.time import ClockType, Duration, Time
 from holozen.testing import Wire, wait_for
+from holozen.testing.process import PATIENCE
 from holozen.transport.graph import Graph
+
+from .sleep import sleeping
 
 
 @pytest.fixture
@@ -113,20 +116,26 @@ def test_one_sleeps_until_the_time_has_come(context: Context) -> None:
     assert clock.sleep_for(Duration(seconds=-1e6), context)
 
 
-def test_one_sleeps_in_simulated_time(context: Context) -> None:
+def test_one_sleeps_in_simulated_time(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
     clock = simulated(1.0)
+    asleep = sleeping(clock, monkeypatch)
     sleeper = Sleeper(lambda: clock.sleep_for(Duration(seconds=2), context))
+    assert asleep.wait(PATIENCE)
     clock.set_ros_time_override(at(2.9))
     assert sleeper.woken is None
     clock.set_ros_time_override(at(3.0))
     assert sleeper.result() is True
 
 
-def test_a_sleep_ends_when_rclpy_is_shut_down(context: Context) -> None:
+def test_a_sleep_ends_when_rclpy_is_shut_down(
+    context: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
     clocks = (Clock(), Clock(clock_type=ClockType.STEADY_TIME), simulated())
+    all_asleep = [sleeping(clock, monkeypatch) for clock in clocks]
     sleepers = [
         Sleeper(partial(clock.sleep_for, Duration(seconds=1000), context)) for clock in clocks
     ]
+    assert all(asleep.wait(PATIENCE) for asleep in all_asleep)
     context.shutdown()
     assert [sleeper.result() for sleeper in sleepers] == [False] * 3
 

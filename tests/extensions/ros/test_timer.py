@@ -18,6 +18,9 @@ from holozen.ros.rclpy.time import ClockType, Duration, Time
 from holozen.ros.rclpy.timer import Timer
 from holozen.ros.rclpy.waitable import Waker
 from holozen.testing import Wire, wait_for
+from holozen.testing.process import PATIENCE
+
+from .sleep import sleeping
 
 Spin = Callable[..., Any]
 
@@ -159,8 +162,9 @@ def test_timers_follow_simulated_time_that_begins_late(ros: Wire, spin_for: Spin
 
 def test_a_rate_sleeps_without_spin_and_catches_up_with_a_late_loop(ros: Wire) -> None:
     node = rclpy.create_node("tom")
-    rate, clock = node.create_rate(200), node.get_clock()
+    clock = node.get_clock()
     start = clock.nanoseconds()
+    rate = node.create_rate(200)
     for _ in range(5):
         rate.sleep()
     assert clock.nanoseconds() - start >= 24_000_000
@@ -192,9 +196,10 @@ def test_a_rate_does_not_wait_for_the_time_of_a_clock_that_was_set_back(ros: Wir
     thread.join()
 
 
-def test_a_rate_ends_with_rclpy(ros: Wire) -> None:
+def test_a_rate_ends_with_rclpy(ros: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
     node = rclpy.create_node("tom")
     rate, raised = node.create_rate(0.001), list[BaseException]()
+    asleep = sleeping(node.get_clock(), monkeypatch)
 
     def sleep() -> None:
         try:
@@ -204,9 +209,17 @@ def test_a_rate_ends_with_rclpy(ros: Wire) -> None:
 
     thread = threading.Thread(target=sleep)
     thread.start()
+    assert asleep.wait(PATIENCE)
     rclpy.shutdown()
     thread.join(10)
     assert len(raised) == 1
+    with pytest.raises(ROSInterruptException):
+        rate.sleep()
+
+
+def test_a_rate_that_was_destroyed_sleeps_no_more(ros: Wire) -> None:
+    rate = rclpy.create_node("tom").create_rate(1)
+    rate.destroy()
     with pytest.raises(RuntimeError, match="destroyed"):
         rate.sleep()
 

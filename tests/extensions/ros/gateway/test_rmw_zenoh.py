@@ -316,7 +316,7 @@ def test_first_commands_that_waited_are_left_out_until_their_publisher_keeps_pac
         commands.pub.put(
             codec.encode(Twist.planar(x=0.2), "cdr"), attachment=sample(number, burst).packed()
         )
-        burst += 0.05
+        burst += 0.01  # less than shows a pace, however this process is held up
     gateway.wait_for_line(
         "ros2: /cmd_vel is not forwarded: a first command has a time of sending more than 0.5 s "
         "from"
@@ -426,25 +426,25 @@ def test_age_needs_no_clock_in_common_and_finds_what_waited() -> None:
     ages = Ages()
     ages_of(ages, (0.0, 0.0))
     assert not ages.kept_pace
-    assert ages.of(sample(2, THEIRS + 0.35), 50.35, CLOCK) == pytest.approx(0.0, abs=1e-6)
-    assert ages.of(sample(3, THEIRS + 0.4), 51.2, CLOCK) == pytest.approx(0.8, abs=1e-6)
-    assert ages.of(sample(4, THEIRS + 1.3), 51.3, CLOCK) == pytest.approx(0.0, abs=1e-6)
+    assert ages.of(sample(2, THEIRS + 0.65), 50.65, CLOCK) == pytest.approx(0.0, abs=1e-6)
+    assert ages.of(sample(3, THEIRS + 0.7), 51.5, CLOCK) == pytest.approx(0.8, abs=1e-6)
+    assert ages.of(sample(4, THEIRS + 1.6), 51.6, CLOCK) == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("apart", [0.02, 0.05, 0.2, 1.0])
 @pytest.mark.parametrize("ahead", [0.0, -1000.0, 1000.0])
 def test_first_commands_that_waited_together_are_old(apart: float, ahead: float) -> None:
-    """Those of a publisher whose link was cut, and which may be dead."""
+    """Those of a publisher whose link was cut, and which may be dead; we are held up meanwhile."""
     ages = Ages()
     for i in range(100):
-        sent, read = CLOCK + i * apart, 100 * apart + 3.0 + i * 0.001
+        sent, read = CLOCK + i * apart, 100 * apart + 3.0 + i * 0.001 + 0.3 * (i >= 50)
         assert ages.of(sample(i, sent + ahead), read, CLOCK + read) > 0.5, f"sample {i}"
     assert not ages.kept_pace
 
 
 def test_a_publisher_is_measured_again_once_it_keeps_pace_after_a_burst() -> None:
     burst = [(i * 0.05, 5.0 + i * 0.001) for i in range(100)]
-    live = [(5.05 + i * 0.05, 5.05 + i * 0.05) for i in range(20)]
+    live = [(5.05 + i * 0.05, 5.05 + i * 0.05) for i in range(30)]
     found = ages_of(Ages(), *burst, *live)
     assert min(found[: len(burst) + 5]) > 0.5
     assert max(found[-10:]) == 0.0
@@ -459,11 +459,11 @@ def test_a_single_command_is_new_where_the_clocks_agree() -> None:
 def test_a_sender_whose_clock_was_set_is_neither_old_for_ever_nor_new_because_of_that() -> None:
     for clock in (1000.0, THEIRS + 10.0):
         ages = Ages()
-        ages_of(ages, (0.0, 0.0), (0.35, 0.35))
+        ages_of(ages, (0.0, 0.0), (0.65, 0.65))
         assert ages.kept_pace
         assert ages.of(sample(3, clock), 55.4, 9000.0) == abs(9000.0 - clock)  # it waited for 5 s
         assert ages.of(sample(4, clock + 5.0), 55.41, 9000.0) > 0.5
-        assert ages.of(sample(5, clock + 5.36), 55.77, 9000.35) == pytest.approx(0.0)
+        assert ages.of(sample(5, clock + 5.66), 56.07, 9000.65) == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize("wrong", [b"", bytes(32), bytes(34), bytes(16) + b"\x0f" + bytes(16)])
