@@ -5,7 +5,7 @@ from collections.abc import Callable, Generator, Iterator
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Locator, Page, sync_playwright
 
 from holozen.messages import Odometry
 from holozen.testing import Process, Wire, wait_for
@@ -70,6 +70,32 @@ def is_soon(condition: Callable[[], bool]) -> bool:
         return wait_for(condition, 1.5)
     except AssertionError:
         return False
+
+
+def insist(act: Callable[[], object], condition: Callable[[], bool], what: str) -> None:
+    """Act until it has an effect: what a page asks for is refused half a second later, and a busy
+    machine may take as long.
+    """
+
+    def tried() -> bool:
+        act()
+        return is_soon(condition)
+
+    wait_for(tried, 20, what)
+
+
+def press(button: Locator) -> None:
+    """Press a button that goes once it was heard."""
+    if button.is_visible():
+        button.click()
+
+
+def release(page: Page) -> None:
+    """Press Release until the robot is released."""
+    button = page.get_by_role("button", name="Release", exact=True)
+    stop = page.get_by_role("button", name="STOP", exact=True)
+    button.wait_for()
+    insist(lambda: press(button), stop.is_visible, "the release")
 
 
 @pytest.fixture(scope="module")

@@ -1,12 +1,15 @@
 """How the robot moves while one drives it from the page."""
 
 import math
+from collections.abc import Callable
 
 from playwright.sync_api import Page
 
 from holozen.messages import Odometry
 from holozen.testing import wait_for
 from holozen.transport.pubsub import Latest
+
+from .conftest import is_soon
 
 STANDS, MOVES = 0.01, 0.1  # m/s or rad/s
 # m; what a robot at 0.5 m/s goes in the 0.5 s that a stop may take, and a little
@@ -81,6 +84,19 @@ def hold(page: Page, key: str, odom: Latest[Odometry]) -> None:
             return False
 
     wait_for(tried, 20, f"{key} to move the robot")
+
+
+def drive(
+    begin: Callable[[], object], end: Callable[[], object], odom: Latest[Odometry], *signs: float
+) -> None:
+    """Hold what moves the robot; again if the browser was too busy to keep it held."""
+
+    def tried() -> bool:
+        end()
+        begin()
+        return is_soon(lambda: has_signs(odom, signs))
+
+    wait_for(tried, 20, f"the robot to move {signs}")
 
 
 def tap(page: Page, key: str, odom: Latest[Odometry]) -> None:

@@ -22,7 +22,7 @@ from holozen.testing import Wire, wait_for
 from holozen.transport.pubsub import Latest
 from tests.faults.proxy import Proxy
 
-from ..conftest import TOKEN, Open, address, is_soon
+from ..conftest import TOKEN, Open, address, insist, is_soon, release
 from ..driving import (
     FARTHEST,
     HALF_A_SECOND,
@@ -133,8 +133,7 @@ def test_a_lost_network_stops_the_robot_and_nothing_that_waited_in_it_moves_it(
     page.get_by_role("heading", name="The view does not answer").wait_for(state="hidden")
     page.get_by_text("Stopped by operator@").wait_for()
     assert stays(odom), "the old click on Release ended no stop from after it"
-    page.get_by_role("button", name="Release", exact=True).click()
-    page.get_by_role("button", name="STOP", exact=True).wait_for()
+    release(page)
 
 
 def test_of_two_pages_one_drives_and_each_stops_the_robot(
@@ -144,9 +143,17 @@ def test_of_two_pages_one_drives_and_each_stops_the_robot(
     hold(page, "w", odom)
     page.get_by_text("you drive").wait_for()
     other.get_by_text("another page drives", exact=True).wait_for()
-    other.keyboard.down("s")
-    other.get_by_text("another page drives this robot", exact=True).wait_for()
-    assert velocity(odom)[0] > MOVES
+    refused = other.get_by_text("another page drives this robot", exact=True)
+
+    def drives_alone() -> bool:
+        return refused.is_visible() and velocity(odom)[0] > MOVES
+
+    def press_both() -> None:
+        other.keyboard.up("s")
+        hold(page, "w", odom)
+        other.keyboard.down("s")
+
+    insist(press_both, drives_alone, "the first page alone to drive")
     page.keyboard.up("w")
     assert wait_for(lambda: stands(odom)) and stays(odom), "the other page has to press again"
     other.keyboard.up("s")
@@ -158,7 +165,7 @@ def test_of_two_pages_one_drives_and_each_stops_the_robot(
     ).wait_for()  # the finger lifts from what is Release by then
     assert stays(odom)
     page.keyboard.up("w")
-    page.get_by_role("button", name="Release", exact=True).click()
+    release(page)
     other.get_by_role("button", name="STOP", exact=True).wait_for()
 
 
@@ -191,8 +198,7 @@ def test_who_presses_stop_twice_does_not_release(
     assert status.wait(seen + 10, 10)
     found = status.read()[0]
     assert found is not None and found.stopped
-    page.get_by_role("button", name="Release", exact=True).click()
-    page.get_by_role("button", name="STOP", exact=True).wait_for()
+    release(page)
 
 
 def test_without_a_robot_a_sheet_says_so_until_one_is_heard_which_stays_chosen_when_its_sim_comes(

@@ -1,6 +1,7 @@
 """Each way to drive from the page."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,20 @@ from holozen.spawning import SpawnPose, put, read, spawn_file
 from holozen.testing import Wire, wait_for
 from holozen.transport.pubsub import Latest
 
-from ..conftest import Open, address
-from ..driving import KEYS, MOVES, has_signs, hold, place, stands, stays, stops_near, tap, velocity
+from ..conftest import Open, address, insist
+from ..driving import (
+    KEYS,
+    MOVES,
+    drive,
+    has_signs,
+    hold,
+    place,
+    stands,
+    stays,
+    stops_near,
+    tap,
+    velocity,
+)
 
 pytestmark = [pytest.mark.needs("chromium"), pytest.mark.alone]
 
@@ -43,9 +56,13 @@ def test_each_key_moves_the_robot_as_its_cap_says_and_its_release_stops_it(
         page.keyboard.up(key)
         stops_near(odom, place(odom))
         assert page.locator("kbd.lit").count() == 0
-    page.keyboard.down("w")
-    page.keyboard.down("a")
-    wait_for(lambda: has_signs(odom, (1, 1, 0)), what="two keys together")
+
+    def both(press: Callable[[str], None]) -> None:
+        press("w")
+        press("a")
+
+    keyboard = page.keyboard
+    drive(lambda: both(keyboard.down), lambda: both(keyboard.up), odom, 1, 1, 0)
     page.keyboard.up("w")
     wait_for(lambda: has_signs(odom, (0, 1, 0)), what="the one that is still held")
     page.keyboard.up("a")
@@ -56,18 +73,18 @@ def test_the_round_stick_translates_and_its_ring_turns_by_mouse(
     page: Page, odom: Latest[Odometry]
 ) -> None:
     x, y = middle(page, "#move")
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x - 45, y)
-    wait_for(lambda: has_signs(odom, (0, 1, 0)), what="the robot to go left")
+
+    def drag(*points: tuple[float, float]) -> None:
+        page.mouse.move(*points[0])
+        page.mouse.down()
+        page.mouse.move(*points[1])
+
+    drive(lambda: drag((x, y), (x - 45, y)), page.mouse.up, odom, 0, 1, 0)
     page.mouse.move(x + 5, y + 45)
     wait_for(lambda: velocity(odom)[0] < -MOVES, what="the robot to go back")
     page.mouse.up()
     stops_near(odom, place(odom))
-    page.mouse.move(x, y - 78)
-    page.mouse.down()
-    page.mouse.move(x + 60, y - 50)
-    wait_for(lambda: has_signs(odom, (0, 0, -1)), what="the robot to turn right")
+    drive(lambda: drag((x, y - 78), (x + 60, y - 50)), page.mouse.up, odom, 0, 0, -1)
     page.mouse.up()
     wait_for(lambda: stands(odom), what="rest")
 
@@ -80,17 +97,22 @@ def test_two_thumbs_drive_on_a_phone_until_they_are_lifted_or_the_browser_takes_
     (x, y), (u, v) = middle(phone, "#move"), middle(phone, "#thumb")
     left, right = {"x": x, "y": y - 45, "id": 1}, {"x": u - 45, "y": v, "id": 2}
 
+    kinds = list[str]()
+
     def put(kind: str, *fingers: Any) -> None:
         touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": list(fingers)})
+        kinds.append(kind)
 
-    put("touchStart", left)
-    wait_for(lambda: has_signs(odom, (1, 0, 0)), what="the robot to go ahead")
+    def lift() -> None:
+        if kinds[-1:] == ["touchStart"]:
+            put("touchEnd")
+
+    drive(lambda: put("touchStart", left), lift, odom, 1, 0, 0)
     put("touchStart", left, right)
     wait_for(lambda: has_signs(odom, (1, 0, 1)), what="and to turn left")
     put("touchEnd")
     stops_near(odom, place(odom))
-    put("touchStart", left, right)
-    wait_for(lambda: has_signs(odom, (1, 0, 1)), what="both thumbs")
+    drive(lambda: put("touchStart", left, right), lift, odom, 1, 0, 1)
     put("touchCancel")
     stops_near(odom, place(odom))
     assert stays(odom)
@@ -99,15 +121,15 @@ def test_two_thumbs_drive_on_a_phone_until_they_are_lifted_or_the_browser_takes_
 def test_a_gamepad_drives_and_has_to_be_let_go_after_a_stop(
     page: Page, odom: Latest[Odometry]
 ) -> None:
-    page.evaluate(GAMEPAD, [-0.8, 0, 0, 0])
-    wait_for(lambda: has_signs(odom, (0, 1, 0)), what="the robot to go left")
+    def let_go() -> None:
+        page.evaluate(GAMEPAD, [0, 0, 0, 0])
+        wait_for(lambda: page.evaluate("looks > 0"), what="the page to look")
+
+    drive(lambda: page.evaluate(GAMEPAD, [-0.8, 0, 0, 0]), let_go, odom, 0, 1, 0)
     page.keyboard.press("k")
     stops_near(odom, place(odom))
     assert stays(odom), "it is still pushed"
-    page.evaluate(GAMEPAD, [0, 0, 0, 0])
-    wait_for(lambda: page.evaluate("looks > 0"), what="the page to look")
-    page.evaluate(GAMEPAD, [0, 0, 0.8, 0])
-    wait_for(lambda: has_signs(odom, (0, 0, -1)), what="the robot to turn right")
+    drive(lambda: page.evaluate(GAMEPAD, [0, 0, 0.8, 0]), let_go, odom, 0, 0, -1)
     page.evaluate(GAMEPAD, None)
     wait_for(lambda: stands(odom), what="rest, since it is gone")
 
@@ -185,7 +207,7 @@ def test_the_speeds_are_three_gears(page: Page, odom: Latest[Odometry]) -> None:
         page.get_by_role("button", name=gear, exact=True).and_(
             page.locator("[aria-checked=true]")
         ).wait_for()
-        hold(page, "w", odom) if gear != "slow" else page.keyboard.down("w")
+        hold(page, "w", odom)
         wait_for(lambda: velocity(odom)[0] > fastest.get("last", 0) + 0.05, what=f"{gear}")
         seen = odom.count
         assert odom.wait(seen + 5, 5)
@@ -224,8 +246,12 @@ def test_a_switch_lets_a_robot_stop_before_what_its_lidar_sees_and_the_page_says
     switch.check()
     page.wait_for_timeout(1500)  # a state from before the click would uncheck it by then
     assert switch.is_checked()
-    page.keyboard.down("w")
-    page.get_by_text("Stopped: 0.1 m ahead.").wait_for()
+
+    def press() -> None:
+        page.keyboard.up("w")
+        page.keyboard.down("w")
+
+    insist(press, page.get_by_text("Stopped: 0.1 m ahead.").is_visible, "a stop before the wall")
     wait_for(lambda: stands(scout), what="the robot to stand before the wall")
     page.keyboard.up("w")
     hold(page, "s", scout)

@@ -1,6 +1,7 @@
 """What the page's drawer and clicks change in the world, and what is drawn then."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from holozen.spawning import SpawnPose, spawn_file
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.pubsub import Latest
 
-from ..conftest import is_soon
+from ..conftest import insist, is_soon, press
 from ..driving import place, stands, tap
 from .pixels import NEAR, SIZE, TOP, choose, colored, deck, pixel, put, shows_it_at
 
@@ -29,14 +30,20 @@ def test_what_is_spawned_and_deleted_by_its_buttons_comes_and_goes(page: Page, b
 
     before = blue()
     page.get_by_label("Model", exact=True).select_option("mecanum")
-    page.get_by_role("button", name="Spawn", exact=True).click()
-    wait_for(lambda: "mecanum1" in entities.names(bus), what="the robot in the sim")
+    insist(
+        page.get_by_role("button", name="Spawn", exact=True).click,
+        lambda: "mecanum1" in entities.names(bus),
+        "the robot in the sim",
+    )
     wait_for(lambda: blue() > before + 50, what="a blue robot")
     choose(page, "mecanum1")
-    page.get_by_role("button", name="Delete the robot").click()
-    assert "mecanum1" in entities.names(bus), "it asks twice"
-    page.get_by_role("button", name="Really delete mecanum1?").click()
-    wait_for(lambda: "mecanum1" not in entities.names(bus), what="it to be deleted")
+
+    def delete() -> None:
+        page.get_by_role("button", name="Delete the robot").click()
+        assert "mecanum1" in entities.names(bus), "it asks twice"
+        page.get_by_role("button", name="Really delete mecanum1?").click()
+
+    insist(delete, lambda: "mecanum1" not in entities.names(bus), "it to be deleted")
     assert "hb_bot" in entities.names(bus)
     page.get_by_text("mecanum1 is gone.").wait_for()
     page.get_by_role("button", name="Drive hb_bot").click()
@@ -89,18 +96,15 @@ def test_the_sim_is_paused_stepped_played_and_reset_by_its_buttons(
         found = latest.read()[0]
         return found or SimulationStatus()
 
-    def click(name: str) -> None:
-        page.locator("#simulation").get_by_role("button", name=name, exact=True).click()
+    def click(name: str, condition: Callable[[], bool], what: str) -> None:
+        button = page.locator("#simulation").get_by_role("button", name=name, exact=True)
+        insist(button.click, condition, what)
 
-    click("Pause")
-    wait_for(lambda: status().state == SimulationState.STATE_PAUSED, what="a paused sim")
+    click("Pause", lambda: status().state == SimulationState.STATE_PAUSED, "a paused sim")
     steps, epoch = status().steps, status().epoch
-    click("Step")
-    wait_for(lambda: status().steps == steps + 24, what="its steps")
-    click("Play")
-    wait_for(lambda: status().state == SimulationState.STATE_PLAYING, what="a sim that plays")
-    click("Reset")
-    wait_for(lambda: status().epoch > epoch, what="a new epoch")
+    click("Step", lambda: status().steps == steps + 24, "its steps")
+    click("Play", lambda: status().state == SimulationState.STATE_PLAYING, "a sim that plays")
+    click("Reset", lambda: status().epoch > epoch, "a new epoch")
     wait_for(lambda: math.hypot(*place(odom)) < 0.01, what="the robot at the start")
 
 
@@ -111,9 +115,11 @@ def click(page: Page, x: float, y: float) -> None:
 
 
 def test_a_robot_is_moved_to_where_one_clicks(page: Page, odom: Latest[Odometry]) -> None:
-    page.get_by_role("button", name="Move the robot").click()
-    click(page, 0.3, 0.4)
-    wait_for(lambda: math.dist(place(odom), (0.3, 0.4)) < 0.05, what="the robot there")
+    def move() -> None:
+        page.get_by_role("button", name="Move the robot").click()
+        click(page, 0.3, 0.4)
+
+    insist(move, lambda: math.dist(place(odom), (0.3, 0.4)) < 0.05, "the robot there")
 
 
 def test_a_goal_that_is_set_by_a_click_on_the_ground_is_reached(
@@ -122,11 +128,16 @@ def test_a_goal_that_is_set_by_a_click_on_the_ground_is_reached(
     tap(page, "a", odom)
     controller = town.start("controller", "--laps", "0")
     wait_for(lambda: any(one.node == "controller" and one.kind == "sub" for one in bus.endpoints()))
-    page.get_by_role("button", name="Set a goal").click()
-    click(page, 0.2, -0.5)
-    page.get_by_text("goal 0.2").wait_for()
+
+    def set_goal() -> None:
+        page.get_by_role("button", name="Set a goal").click()
+        click(page, 0.2, -0.5)
+
+    insist(set_goal, page.get_by_text("goal 0.2").is_visible, "the goal in the page")
     controller.wait_for_line("goal_pose: (0.2")
-    page.get_by_role("button", name="Let the controller drive").click()  # a person drove last
+    drive = page.get_by_role("button", name="Let the controller drive")  # a person drove last
+    drive.wait_for()
+    insist(lambda: press(drive), drive.is_hidden, "it to drive")
     wait_for(
         lambda: math.dist(place(odom), (0.2, -0.5)) < 0.04 and stands(odom),
         20,
