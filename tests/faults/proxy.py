@@ -152,7 +152,7 @@ class _Way:
         self.size = 0  # bytes that wait
         self.carried = 0  # bytes that came so far
         self._opened = self._due = opened
-        self._broken = False
+        self.has_lost = False  # bytes, and says nothing from then on
         self._changed = threading.Condition()
 
     def read(self) -> None:
@@ -169,8 +169,8 @@ class _Way:
 
     def _put(self, data: bytes) -> None:
         faults = self._faults
-        self._broken |= faults.lost
-        if self._broken and data:
+        self.has_lost |= faults.lost
+        if self.has_lost and data:
             return
         sent = max(time.monotonic(), self._opened)
         if faults.rate:

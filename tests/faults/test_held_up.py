@@ -37,8 +37,10 @@ def test_processes_that_are_held_up_for_seconds_stay_linked(
         pauses = {random.uniform(2.0, 3.0): process for process in held_up}
         for process in held_up:
             process.signal(signal.SIGSTOP)
-        began, count = time.monotonic(), odom.count
-        time.sleep(min(pauses) - 0.5)
+        began = time.monotonic()
+        time.sleep(0.5)  # what this process has not read yet
+        count = odom.count
+        time.sleep(min(pauses) - 1.0)
         heard = odom.count
         for pause, process in sorted(pauses.items()):
             time.sleep(max(0.0, began + pause - time.monotonic()))

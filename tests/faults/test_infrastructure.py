@@ -129,6 +129,7 @@ def test_a_black_hole_swallows_and_what_lost_bytes_stays_silent(
     echo.far.settimeout(0.2)
     with pytest.raises(TimeoutError):
         echo.far.recv(4)
+    wait_for(lambda: any(way.has_lost for way in link.ways), what="the bytes to be swallowed")
     link.set(lost=False)
     echo.near.sendall(b"gone too")
     with pytest.raises(TimeoutError):

@@ -45,6 +45,7 @@ def test_a_process_gets_in_over_a_slow_link(wire: Wire, proxy: Proxy) -> None:
         list(pool.map(gets_in, ("client", "peer")))
 
 
+@pytest.mark.alone
 def test_over_a_slow_link_a_verb_sees_the_nodes_and_reports_what_it_waits_for_and_a_stop_reaches_the_robot(  # noqa: E501
     wire: Wire, proxy: Proxy
 ) -> None:
@@ -117,8 +118,18 @@ def test_processes_meet_though_others_do_not_answer(wire: Wire, others: str) -> 
     wire.start("sim").wait_for_line("listens on")
     verbs = [("topic", "list"), ("topic", "echo", "odom", "--once", "--timeout", "20"), ("stop",)]
     topics, echo, stop = (wire.start(*words) for words in verbs)
-    assert (topics.wait(), notes(topics.err)) == (0, [])
-    assert "odom" in topics.out.split()
+
+    def listed() -> bool:
+        """Or again, where a busy machine did not let the sim answer in time."""
+        nonlocal topics
+        topics.wait()
+        if "odom" in topics.out.split():
+            return True
+        topics = wire.start(*verbs[0])
+        return False
+
+    wait_for(listed, what=lambda: f"odom; {topics.out}{topics.err}")
+    assert (topics.returncode, notes(topics.err)) == (0, [])
     assert echo.wait() == 0
     assert stop.wait() == 0
     assert stop.out in STOPPED

@@ -15,7 +15,8 @@ from holozen.transport.graph import ALL_NODE_INFO
 
 from .history import STEP, History
 
-pytestmark = pytest.mark.needs("faketime")
+# Alone, for the observer's clock dates what it receives, once the sim's has jumped.
+pytestmark = [pytest.mark.needs("faketime"), pytest.mark.alone]
 
 HERE = Path(__file__).parent
 HOUR = 3600.0

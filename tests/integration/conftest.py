@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -19,7 +20,8 @@ Verb = Callable[..., subprocess.CompletedProcess[str]]
 Done = subprocess.CompletedProcess[str]
 PATIENT = 2.0  # s
 SPAWN = ("spawn", "--timeout", "30")  # s for a sim that a busy machine holds up
-LATE = "not obeyed: late: "  # what `topic pub` says of a command that was held up
+# what `topic pub` says of a command that was held up
+LATE = re.compile("not obeyed: (late|old): ")
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +82,7 @@ def comes_to(wanted: object, look: Callable[[], object]) -> None:
 
 def in_time(command: Callable[[], Done]) -> Done:
     """What became of a command that came in time: another one, where a busy machine held it up."""
-    done = wait_for(lambda: None if LATE in (done := command()).stderr else done)
+    done = wait_for(lambda: None if LATE.search((done := command()).stderr) else done)
     assert done
     return done
 

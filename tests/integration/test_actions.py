@@ -154,7 +154,9 @@ def test_a_newer_goal_ends_the_one_before(town: Wire, robot: Robot) -> None:
     second = sent(town, FAR)
     assert aborted(first) == "a newer goal came"
     goals = town.bus().publisher("goal_pose", PoseStamped)
-    wait_for(lambda: goals.matched)
+    echoes = goals.echoes
+    assert echoes is not None
+    wait_for(lambda: goals.matched and echoes.may_command(), what="the controller to be heard")
     here = robot.newest().pose.pose.position
     goals.put(PoseStamped(Header(frame_id="odom"), Pose(Point(here.x, here.y, 0.0))))
     assert aborted(second) == "a newer goal came on goal_pose"

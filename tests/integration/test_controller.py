@@ -114,12 +114,11 @@ def test_it_yields_to_a_person_and_stays_off_until_resume(town: Wire, shared: Sc
     stood = shared.robot.stands()
     later = shared.robot.pass_time(1.0)
     assert distance(stood, later) < 1e-3, "it does not take the robot back"
+    assert shared.controller.err.count("continues") == continued
     done = town.run("controller", "--resume")
     assert (done.returncode, done.stderr) == (0, "every source may drive\n")
     shared.controller_drives()
-    wait_for(
-        lambda: shared.controller.err.count("continues") == continued + 1, what="it to report that"
-    )
+    wait_for(lambda: shared.controller.err.count("continues") > continued, what="it to report that")
 
 
 def test_it_publishes_no_cmd_vel_while_a_person_has_the_robot(shared: Scene) -> None:
@@ -216,8 +215,8 @@ def test_it_has_patience_with_a_pose_service_that_comes_last_and_goes(wire: Wire
     controller.wait_for_line("waiting for ")
     start(wire, "sim")
     controller.wait_for_line("waiting for goal 0: no reply from 'next_goal'")
-    service = start(wire, "pose-service")["pose-service"]
     robot = Robot(wire.bus())
+    service = start(wire, "pose-service")["pose-service"]
     robot.odom.next(lambda odom: place(odom)[0] > 0.4)  # on its way to the first goal
     service.kill()
     start(wire, "pose-service")

@@ -119,7 +119,9 @@ def test_a_repeat_rate_of_zero_sends_a_command_once(town: Wire, robot: Robot) ->
         commands = robot.commands.from_now()
         after(robot, terminal, "i")
         robot.pass_time(0.4)
-        assert [planar(command) for command in commands.messages()] == [(0.5, 0, 0, 0)]
+        # It stops where a busy machine lets it lose sight of the robot.
+        sent = [planar(command) for command in commands.messages() if any(planar(command))]
+        assert sent == [(0.5, 0, 0, 0)]
         terminal.type("k")
         robot.wait_for_stop_command()
 
@@ -157,7 +159,9 @@ def test_the_teleop_shows_what_a_robot_cannot_do_and_the_limits_that_the_sim_has
     terminal = start_teleop(wire, "--mode", "latch")
     terminal.wait_for_text("limit 5")
     assert "1000" not in terminal.screen()
-    assert wire.run("param", "set", "sim", "max_linear", "0.2").returncode == 0
+    wait_for(  # a busy sim may be discovered late
+        lambda: wire.run("param", "set", "sim", "max_linear", "0.2").returncode == 0
+    )
     terminal.wait_for_text("limit 0.2")
     terminal.hold_until(
         "i", lambda: "limit: the robot is driven at no more than 0.2 m/s" in terminal.screen()

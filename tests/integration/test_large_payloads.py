@@ -57,7 +57,7 @@ def test_a_sim_that_got_huge_payloads_counts_them_and_is_as_small_as_before(
     before, counted, links = (
         memory(sim),
         status.next().refused.get("oversized", 0),
-        driver.session.info.peers_zid(),
+        {*map(str, driver.session.info.peers_zid())},
     )
     sender = foreign.session.declare_publisher(
         key, congestion_control=zenoh.CongestionControl.BLOCK
@@ -75,7 +75,7 @@ def test_a_sim_that_got_huge_payloads_counts_them_and_is_as_small_as_before(
     wait_for(
         lambda: memory(sim) < before + NEAR, what=lambda: f"{before} bytes; it has {memory(sim)}"
     )
-    assert driver.session.info.peers_zid() == links
+    assert links <= {*map(str, driver.session.info.peers_zid())}, "nobody lost a link"
 
     def moves() -> bool:
         commands.put(Twist.planar(0.1))

@@ -333,6 +333,8 @@ def test_steps_end_with_ctrl_c_and_with_their_timeout(
     )
     stands(sim)
     late = verb(town, "sim", "step", "10000000", "--timeout", "1")
+    while "no step was made" in late.stderr:  # a busy machine took longer to begin
+        late = verb(town, "sim", "step", "10000000", "--timeout", "1")
     assert late.returncode == 1
     assert re.fullmatch(
         r"holozen sim: not done within 1 s, and ended: the goal was cancelled, \d+ steps before "

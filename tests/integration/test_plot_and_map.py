@@ -137,8 +137,12 @@ def test_an_error_is_reported_in_one_line(
 def test_the_map_shows_the_robot_and_the_goals(verb: Verb, town: Wire, robot: Robot) -> None:
     service = town.start("pose-service")
     service.wait_for_line("4 goals")
-    wait_for(lambda: "hb_bot x" in verb(town, "map", "--once").stdout)
-    lines = verb(town, "map", "--once").stdout.splitlines()
+
+    def once() -> str:
+        text = verb(town, "map", "--once").stdout
+        return text if "hb_bot x" in text else ""
+
+    lines = wait_for(once).splitlines()
     assert len(lines) == 24
     assert all(len(line) <= 80 for line in lines)
 

@@ -197,9 +197,16 @@ def test_service_call_again_and_again(town: Wire) -> None:
 
 
 def test_node_info_shows_what_a_node_reads_writes_and_serves(verb: Verb, town: Wire) -> None:
-    # the tokens of what it serves come last
-    wait_for(lambda: "simulate_steps" in verb(town, "node", "info", "sim").stdout)
-    lines = verb(town, "node", "info", "sim").stdout.splitlines()
+    def shown(*words: str) -> str:
+        """Once it has what comes last: the tokens of what the node serves."""
+
+        def look() -> str:
+            text = verb(town, "node", "info", *words).stdout
+            return text if "simulate_steps" in text else ""
+
+        return wait_for(look)
+
+    lines = shown("sim").splitlines()
     assert lines[1:3] == ["  Subscribers:", "    cmd_vel: geometry_msgs/msg/Twist"]
     assert (
         "    odom: nav_msgs/msg/Odometry"
@@ -209,7 +216,7 @@ def test_node_info_shows_what_a_node_reads_writes_and_serves(verb: Verb, town: W
     assert "    resume: std_srvs/srv/Trigger" in lines[lines.index("  Service Servers:") : servers]
     assert lines[servers + 1] == "    simulate_steps: simulation_interfaces/action/SimulateSteps"
     assert not any("_action" in line for line in lines)
-    output = json.loads(verb(town, "node", "info", "/sim", "--json").stdout)
+    output = json.loads(shown("/sim", "--json"))
     assert {"key": "odom", "type": "nav_msgs/msg/Odometry"} in output["publishers"]
     assert [row["key"] for row in output["action_servers"]] == ["simulate_steps"]
 

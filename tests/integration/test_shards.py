@@ -68,11 +68,11 @@ def test_robots_of_all_shards_drive_and_are_stopped_paused_and_reset(
     for robot in robots:
         robot.stands()
     assert verb(town, "release").returncode == 0
-    assert verb(town, "sim", "pause").stdout == "paused\n"
+    comes_to("paused\n", lambda: verb(town, "sim", "pause").stdout)
     for shard in shards:
         shard.wait_for_line("sim: set to paused by")
-    assert verb(town, "sim", "play").stdout == "playing\n"
-    assert verb(town, "sim", "reset").returncode == 0
+    comes_to("playing\n", lambda: verb(town, "sim", "play").stdout)
+    comes_to(0, lambda: verb(town, "sim", "reset").returncode)
     for shard in shards:
         shard.wait_for_line("it was reset")
     assert names(town, verb) == []

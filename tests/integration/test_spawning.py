@@ -11,12 +11,13 @@ from pathlib import Path
 import pytest
 
 from holozen import entities
+from holozen.bus import Bus
 from holozen.messages import Clock
 from holozen.messages import simulation_interfaces as si
 from holozen.robot.files.xacro import expand_xacro
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.errors import ServiceError
-from holozen.transport.graph import Endpoint
+from holozen.transport.graph import Endpoint, Graph
 
 from .conftest import SPAWN, Verb
 from .robots import Robot, distance, place
@@ -51,6 +52,16 @@ def wire(town: Wire) -> Wire:
 def keys(endpoints: list[Endpoint]) -> set[str]:
     """What the sim stands on."""
     return {endpoint.key for endpoint in endpoints if endpoint.node == "sim"}
+
+
+def all_keys(bus: Bus, graph: Graph) -> set[str]:
+    """Once what it announces last is there."""
+
+    def look() -> set[str]:
+        found = keys(graph.settled(bus.connected))
+        return found if any("simulate_steps" in key for key in found) else set()
+
+    return wait_for(look, what="all keys of the sim")
 
 
 def patiently(words: tuple[str, ...]) -> tuple[str, ...]:
@@ -216,7 +227,7 @@ def test_a_robot_deleted_while_it_drives_leaves_no_key_alive(
 ) -> None:
     bus = wire.bus()
     graph = bus.graph()
-    before = keys(graph.settled(bus.connected))
+    before = all_keys(bus, graph)
     done(verb, wire, "spawn", HB_BOT, "--name", "Fred")
     fred = Robot(bus, "Fred")
     fred.drive(0.5)
@@ -234,7 +245,7 @@ def test_many_robots_in_a_row_leave_no_key_and_little_memory_and_the_sim_keeps_i
     count = trials(50, 200)
     bus = wire.bus()
     graph, text = bus.graph(), expand_xacro(Path(HB_BOT))
-    before, clock = keys(graph.settled(bus.connected)), bus.latest("clock", Clock)
+    before, clock = all_keys(bus, graph), bus.latest("clock", Clock)
 
     def spawn_and_delete(name: str) -> None:
         bus.call(

@@ -16,7 +16,9 @@ from .conftest import LATE, Verb, comes_to
 from .processes import assert_one_line
 from .robots import Robot, moves, planar
 
-SLOW = "no new messages"  # what is reported where a busy machine lets nothing come for a second
+# What is reported where a busy machine lets nothing come for a second.
+WAITS = "waiting for odom; no messages yet"
+SLOW = "no new messages"
 TOPICS = {
     "clock": "rosgraph_msgs/msg/Clock",
     "cmd_vel": "geometry_msgs/msg/Twist",
@@ -70,7 +72,7 @@ def test_echo_as_json_is_one_object_a_line(town: Wire, robot: Robot) -> None:
     odoms = [json.loads(line) for line in echo.out.splitlines()[:3]]
     assert {odom["child_frame_id"] for odom in odoms} == {"footprint_link"}
     assert echo.interrupt() == 130
-    assert echo.err == ""
+    assert all(line.startswith(WAITS) for line in echo.err.splitlines()), echo.err
 
 
 def test_echo_follows_a_key_expression(town: Wire, robot: Robot) -> None:
@@ -139,7 +141,7 @@ def test_a_reader_that_has_seen_enough_ends_it_quietly(town: Wire, robot: Robot)
             process = town.start("topic", "echo", "odom", stdout=output)
         reader.readline()
     assert process.wait() == 0
-    assert all(line.startswith(SLOW) for line in process.err.splitlines()), process.err
+    assert all(line.startswith(WAITS) for line in process.err.splitlines()), process.err
 
 
 def test_hz_shows_the_rate(town: Wire, robot: Robot) -> None:
@@ -184,21 +186,26 @@ def test_pub_takes_json_and_yaml_twist_and_twist_stamped(
         robot.odom.next(lambda odom: moves(odom, *driven))
 
 
+def held_up(robot: Robot) -> int:
+    """The commands so far that a busy machine has held up, each of which is sent again."""
+    refused = robot.status().refused
+    return refused.get("late", 0) + refused.get("old", 0)
+
+
 @pytest.mark.parametrize(
     ("words", "count"), [(["-1"], 1), (["--times", "5", "--rate", "100"], 5 + STOPS)]
 )
 def test_pub_sends_as_often_as_requested_and_stops_after_more_than_one(
     verb: Verb, town: Wire, robot: Robot, words: list[str], count: int
 ) -> None:
-    commands, late = robot.commands.from_now(), robot.status().refused.get("late", 0)
+    commands, late = robot.commands.from_now(), held_up(robot)
     done = verb(town, "topic", "pub", "cmd_vel", '{"linear": {"x": 0.3}}', *words)
-    assert done.returncode == 0 or LATE in done.stderr, done.stderr
+    assert done.returncode == 0 or LATE.search(done.stderr), done.stderr
     wait_for(lambda: len(commands.messages()) >= count, what="that many commands")
     robot.stands()
     sent = [planar(command)[0] for command in commands.messages()]
     if count == 1:  # and again for each that a busy machine held up
-        late = robot.status().refused.get("late", 0) - late
-        assert 1 <= len(sent) <= 1 + late and set(sent) == {0.3}
+        assert 1 <= len(sent) <= 1 + held_up(robot) - late and set(sent) == {0.3}
     else:
         assert sent == [0.3] * 5 + [0.0] * STOPS
 

@@ -67,13 +67,18 @@ class Robots:
         return answer
 
     @contextmanager
-    def joined_later(self, key: str) -> Iterator[None]:
-        """A sim with this key joins once another one was called."""
+    def joined_later(self, key: str, patch: pytest.MonkeyPatch) -> Iterator[None]:
+        """A sim with this key joins once another one was called. All count as found soon after it
+        was called too, however late that is on a busy machine.
+        """
         bus = self.wire.bus("late")  # a busy machine takes long to open one
+        patch.setattr(stop_module, "QUIET", PATIENCE)
 
         def join() -> None:
             self.first_called.wait()
             self.add(key, bus=bus)
+            wait_for(lambda: (key, bus.id) in self.called, what="a call of the late one")
+            patch.setattr(stop_module, "QUIET", 0.5)
 
         late = threading.Thread(target=join)
         late.start()
@@ -151,9 +156,11 @@ def test_all_are_stopped_although_the_reader_has_gone(robots: Robots) -> None:
     assert robots.keys() == {"Ann/stop", "Bob/stop"}
 
 
-def test_one_that_is_met_later_than_others_is_stopped_too(robots: Robots, run: Run) -> None:
+def test_one_that_is_met_later_than_others_is_stopped_too(
+    robots: Robots, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
     robots.add("Ann/stop")
-    with robots.joined_later("Fred/stop"):
+    with robots.joined_later("Fred/stop", monkeypatch):
         assert run("stop")[0] == 0
     assert robots.keys() == {"Ann/stop", "Fred/stop"}
 
@@ -223,8 +230,9 @@ def test_as_json_it_is_one_object_a_robot(robots: Robots, run: Run) -> None:
 
 
 def test_those_that_are_named_are_stopped_and_no_other_and_one_at_the_root_by_its_name(
-    robots: Robots, run: Run
+    robots: Robots, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(stop_module, "NAMING", PATIENCE)
     bus = robots.add("stop", "Fred/stop", "Ann/stop", "Bob/stop")
     with repeated(bus, CommandStatus(name="hb_bot")):
         assert run("stop", "Fred", "/Ann")[::2] == (0, "")
@@ -289,10 +297,10 @@ def test_where_two_sims_serve_one_robot_both_have_to_confirm(robots: Robots, run
 
 @pytest.mark.parametrize("names", [(), ("Fred",)], ids=["all", "named"])
 def test_a_sim_that_is_met_after_another_confirmed_the_same_robot_is_asked_too(
-    robots: Robots, run: Run, names: tuple[str, ...]
+    robots: Robots, run: Run, names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robots.add("Fred/stop")
-    with robots.joined_later("Fred/stop"):
+    with robots.joined_later("Fred/stop", monkeypatch):
         assert run("stop", *names) == (0, "Fred is stopped\n", "")
     assert len(robots.called) == 2
 

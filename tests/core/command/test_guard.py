@@ -12,14 +12,14 @@ from holozen.messages import Twist
 from holozen.testing import Process, Wire, wait_for
 
 BASE = """
-import sys, time
+import os, sys, time
 from pathlib import Path
 from holozen.bus import Bus, Connection
 from holozen.command.base import Base
 from holozen.command.guard import Guard
 wheels, hang, endpoint, state = *map(Path, sys.argv[1:3]), *sys.argv[3:]
 def drive(x):
-    (new := wheels.with_suffix(f".{x}")).write_text(str(x))
+    (new := wheels.with_suffix(f".{os.getpid()}")).write_text(str(x))
     new.replace(wheels)
 guard = Guard(lambda: drive(0.0))
 with Bus("base", Connection(connect=(endpoint,), listen=(endpoint,)), lasting=True) as bus:

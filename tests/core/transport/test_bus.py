@@ -29,6 +29,7 @@ from holozen.messages import (
 )
 from holozen.output import CDR, SampleReader
 from holozen.testing import Wire, wait_for
+from holozen.testing.process import PATIENCE
 from holozen.transport import services as module
 from holozen.transport import session as session_module
 from holozen.transport.connection import Connection
@@ -509,7 +510,8 @@ def test_a_client_waits_for_its_router_and_reports_it(
     wire: Wire, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with ThreadPoolExecutor() as pool:
-        client = pool.submit(Bus, "client", Connection("client", connect=(wire.endpoint,)))
+        connection = Connection("client", connect=(wire.endpoint,))
+        client = pool.submit(Bus, "client", connection, patience=PATIENCE)
         wait_for(lambda: wire.endpoint in capsys.readouterr().err)
         with Bus("router", Connection("router", listen=(wire.endpoint,))), client.result(30) as bus:
             wait_for(bus.connected)

@@ -136,6 +136,8 @@ timer = node.create_timer(0.01, up)
 """
 SPIN = "rclpy.spin(node)"
 POLITE = """
+import rclpy.context
+rclpy.context.GRACE = 1000.0  # a busy machine may take long to stop
 try:
     rclpy.spin(node)
 except (KeyboardInterrupt, ExternalShutdownException):

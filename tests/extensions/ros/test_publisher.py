@@ -84,6 +84,7 @@ def test_after_a_signal_there_is_time_for_a_stop_and_no_more(
     publisher = rclpy.create_node("tom").create_publisher(Twist, "cmd_vel", 1)
     tap = ros.bus().subscribe_raw("cmd_vel")
     wait_for(publisher.get_subscription_count)
+    monkeypatch.setattr(context, "GRACE", 1000.0)
     rclpy.get_default_context().interrupt()
     assert not rclpy.ok()
     publisher.publish(Twist())

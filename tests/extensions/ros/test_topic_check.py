@@ -1,5 +1,7 @@
 """A node whose topics only a robot with a name has is told of that robot's."""
 
+import threading
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -9,12 +11,15 @@ from holozen.ros import rclpy
 from holozen.ros.generated import find
 from holozen.ros.rclpy import topic_check
 from holozen.testing import Wire, wait_for
+from holozen.testing.process import PATIENCE
 
 
 def test_topics_that_only_a_robot_with_a_name_has_are_logged_with_its_own(
     ros: Wire, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(topic_check, "AFTER", 0.05)
+    made = threading.Event()  # all topics of both nodes
+    waker = SimpleNamespace(wait=lambda _: not made.wait(PATIENCE), wake=made.set)
+    monkeypatch.setattr(topic_check, "Waker", lambda: waker)
     sim = ros.bus("sim", lasting=True)
     written = [
         sim.publisher("Fred/odom", Odometry),
@@ -32,6 +37,7 @@ def test_topics_that_only_a_robot_with_a_name_has_are_logged_with_its_own(
         return made
 
     nodes = [node("ann", "Fred/"), node("tom", "")]
+    made.set()
     (line,) = wait_for(lambda: capfd.readouterr().err.splitlines())
     rules = "-r /cmd_vel:=/Fred/cmd_vel -r /odom:=/Fred/odom -r /tf:=/Fred/tf"
     what = "nothing reads cmd_vel, nothing publishes odom and tf; a robot with a name has its own"

@@ -10,6 +10,7 @@ import pytest
 
 from holozen.messages import Header, Odometry, Point, Pose, SceneEntity, Time, Twist
 from holozen.testing import Wire, wait_for
+from holozen.testing.process import PATIENCE
 from holozen.view import drive
 from holozen.view.drive import Driver, Drivers
 from holozen.view.helm import OTHER, RESET
@@ -120,7 +121,15 @@ def test_a_view_that_ends_stops_what_it_drives_and_nothing_counts_from_then_on(
     assert not driver.is_used()
 
 
-def test_a_command_goes_on_as_it_comes_and_one_that_is_refused_does_not(wire: Wire) -> None:
+@pytest.fixture
+def no_silence(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However long a busy machine takes to hold again, it is no silence."""
+    monkeypatch.setattr("holozen.view.helm.HELD", PATIENCE)
+
+
+def test_a_command_goes_on_as_it_comes_and_one_that_is_refused_does_not(
+    wire: Wire, no_silence: None
+) -> None:
     sim = wire.bus("sim")
     odom, commands = sim.publisher("odom", Odometry), sim.subscribe("cmd_vel", Twist)
     driver, seen = Driver(wire.bus("view"), "cmd_vel", "odom"), list[Twist]()
@@ -143,7 +152,9 @@ def test_a_command_goes_on_as_it_comes_and_one_that_is_refused_does_not(wire: Wi
     driver.close()
 
 
-def test_what_is_held_while_the_robot_is_reset_counts_as_let_go(wire: Wire) -> None:
+def test_what_is_held_while_the_robot_is_reset_counts_as_let_go(
+    wire: Wire, no_silence: None
+) -> None:
     sim = wire.bus("sim")
     odom, commands = sim.publisher("odom", Odometry), sim.subscribe("cmd_vel", Twist)
     driver, seen, whys = (
@@ -167,7 +178,9 @@ def test_what_is_held_while_the_robot_is_reset_counts_as_let_go(wire: Wire) -> N
     driver.close()
 
 
-def test_a_robot_that_beats_gets_the_beats_that_the_page_had_heard(wire: Wire) -> None:
+def test_a_robot_that_beats_gets_the_beats_that_the_page_had_heard(
+    wire: Wire, no_silence: None
+) -> None:
     sim = wire.bus("sim")
     beat, commands = sim.beat(), sim.subscribe("cmd_vel", Twist)
     driver, echoes = Driver(wire.bus("view"), "cmd_vel", "odom"), list[tuple[str, int]]()

@@ -343,7 +343,7 @@ def test_in_a_terminal_space_pauses_and_the_arrow_steps(wire: Wire, tmp_path: Pa
     rows = [("a", b"%d" % i, "text/plain", i * 20_000.0) for i in range(5)]
     tap = wire.bus().subscribe_raw("a")
     terminal = wire.terminal("replay", bag(tmp_path / "a.mcap", *rows))
-    terminal.wait_for_text("space pauses")
+    terminal.wait_for_text("1 messages; space pauses")
     terminal.type(" ")
     terminal.wait_for_text("paused: space resumes")
     terminal.type("\x1b[C")

@@ -30,6 +30,7 @@ from holozen.messages.rcl_interfaces import GetParametersReply, GetParametersReq
 from holozen.secure import authority
 from holozen.secure.members import Member, load
 from holozen.testing import Process, wait_for
+from holozen.testing.wire import free_port
 from holozen.transport.pubsub import Subscription
 from holozen.transport.samples import Numbers, Sample, stamps
 from tests.fleet import Fleet
@@ -582,8 +583,7 @@ def test_a_revoked_member_reads_and_does_nothing(fleet: Fleet, watch: Watch, sen
 def test_a_member_is_no_router_for_others(fleet: Fleet, tmp_path: Path) -> None:
     """An attacker who can change where others connect to, without the router's key."""
     tls = "transport__link__tls__"
-    folder, port = fleet.root / "Eve", fleet.endpoint.rpartition(":")[2]
-    endpoint = f"tls/127.0.0.1:{int(port) + 1}"
+    folder, endpoint = fleet.root / "Eve", f"tls/127.0.0.1:{free_port()}"
     listening = {
         f"{tls}listen_certificate": str(folder / "cert.pem"),
         f"{tls}listen_private_key": str(folder / "key.pem"),
