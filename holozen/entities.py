@@ -284,7 +284,6 @@ def _check_that_all_did(bus: Bus, did: int, sims: int) -> None:
     """
     if silent := silent_sims(bus):
         raise ServiceError(f"{', '.join(silent)} did not answer, {DONE}; {HANGS}")
-    sims = max(sims, len(bus.endpoints(SIMS)))  # one may have been heard of since
     if did < sims:
         raise ServiceError(f"{sims - did} of {sims} sims refused or did not answer, {DONE}")
 
@@ -298,6 +297,7 @@ def _control(bus: Bus, key: str, request: Message, reply: type[Any]) -> list[str
     )
     sims = len(bus.endpoints(SIMS))
     answers = bus.call_all(key, request, reply, PATIENCE)
+    sims = max(sims, len(bus.endpoints(SIMS)))  # one may have been heard of since
     _check_that_all_did(bus, len(answers), sims)
     return [warning for answer in answers if (warning := answer.result.error_message)]
 

@@ -62,14 +62,16 @@ def _order(args: argparse.Namespace, where: connection.Connection, here: "Answer
             code = orders.report()
             silent = "" if orders.found else bus.silent()
     except BusError as error:
-        for one in here.read(max(0.0, cli.began + args.timeout - time.monotonic())):
-            _print_here(args, one)
-        _print_missing(args, here.missing())
+        if not _are_confirmed(args, here):
+            for one in here.read(max(0.0, cli.began + args.timeout - time.monotonic())):
+                _print_here(args, one)
+        failed = not _are_confirmed(args, here)
+        if failed:
+            _print_missing(args, here.missing())
         if not here.received:
             raise Failure(f"no robot was reached: {error}") from None
         report(f"holozen stop: robots elsewhere were not reached: {error}")
-        names = {name for one in here.received if one.confirmed for name in (one.robot, one.name)}
-        return int(not args.robots or not names.issuperset(name.strip("/") for name in args.robots))
+        return int(failed)
     if not orders.found:
         reason = (
             f"no robot was found{connection.FORBIDDEN}"
@@ -80,6 +82,12 @@ def _order(args: argparse.Namespace, where: connection.Connection, here: "Answer
             raise Failure(f"no robot was reached: {silent}")
         raise Failure(f"{reason}; `holozen list` shows what a sim has, --connect where to look")
     return code
+
+
+def _are_confirmed(args: argparse.Namespace, here: "Answers") -> bool:
+    """Whether all robots that are named have confirmed without a network."""
+    names = {name for one in here.received if one.confirmed for name in (one.robot, one.name)}
+    return bool(args.robots) and names.issuperset(name.strip("/") for name in args.robots)
 
 
 def _print_here(args: argparse.Namespace, one: "LocalStop") -> None:

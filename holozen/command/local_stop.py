@@ -32,6 +32,10 @@ HELD_UP = 0.3  # s without a pass of the loop after which a stop is answered for
 # What a busy machine answers later counts too.
 ANSWERS = 0.6
 LARGEST = 1 << 20  # bytes of a request, and of a reply: more than the kernel sends at once
+BUFFER = 1 << 18  # bytes for it in the kernel
+FULL = (errno.EAGAIN, errno.ENOBUFS)  # the receiver has as many as it may
+ATTEMPTS, AGAIN = 10, 0.01  # to answer, and s between two
+LEFT = 60.0  # s after which a caller of another machine has ended
 HANGS = "its process hangs and drives nothing; it is still stopped when the process goes on"
 TURNS = "its process hangs, and has no guard that stops its wheels: use the robot's own switch"
 
@@ -152,7 +156,7 @@ class LocalStops(Declared):
         by = str(asked["by"]) or UNKNOWN_CALLER
         rows = self._stop(by, set(asked["robots"]), set(asked["networks"]))
         with _address(reply) as address:
-            here.sendto(json.dumps(rows).encode(), socket.MSG_DONTWAIT, address)
+            _send(here, json.dumps(rows).encode(), address)
 
     def _stop(self, by: str, wanted: set[str], networks: set[str]) -> list[LocalStop]:
         if not networks & self._networks:
@@ -263,6 +267,18 @@ def _mark(network: str) -> str:
     return f"{zlib.crc32(network.encode()):08x}"
 
 
+def _send(here: socket.socket, answer: bytes, address: str) -> None:
+    """Send an answer; again if the caller, whom a busy machine holds up, has ten already."""
+    for _ in range(ATTEMPTS):
+        try:
+            here.sendto(answer, socket.MSG_DONTWAIT, address)
+            return
+        except OSError as error:
+            if error.errno not in FULL:
+                raise
+        time.sleep(AGAIN)
+
+
 def _ask(here: socket.socket, path: Path, request: bytes) -> bool:
     """Send a request; returns whether the process is there. Removes the socket of one that has
     ended.
@@ -273,10 +289,8 @@ def _ask(here: socket.socket, path: Path, request: bytes) -> bool:
     except ConnectionRefusedError:
         path.unlink(missing_ok=True)
         return False
-    except BlockingIOError:  # it has a queue of stops already
-        return True
-    except OSError:  # it has just ended
-        return False
+    except OSError as error:
+        return error.errno in FULL  # of stops already, or it has just ended
     return True
 
 
@@ -285,16 +299,21 @@ def _is_gone(path: Path) -> bool:
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end, _address(path) as address:
             end.connect(address)
-    except OSError:
+    except (ConnectionRefusedError, FileNotFoundError):
         return True
+    except OSError:  # that cannot be known now
+        return False
     return False
 
 
 def _remove_replies(folder: Path) -> None:
-    """Remove what callers that were killed have left."""
+    """Remove what callers that were killed have left. Another machine may share the folder: those
+    that may be at work there stay.
+    """
     for path in folder.glob("*.reply"):
-        if _is_gone(path):
-            path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # it has gone
+            if time.time() - path.stat().st_mtime > LEFT and _is_gone(path):
+                path.unlink()
 
 
 def _own_folder(path: Path) -> Path:
@@ -315,6 +334,9 @@ def _bound(path: Path) -> socket.socket:
         with _address(path) as address:
             here.bind(address)
         path.chmod(0o600)
+        for size in (socket.SO_SNDBUF, socket.SO_RCVBUF):  # macOS has 2 KB
+            with contextlib.suppress(OSError):  # more than it allows
+                here.setsockopt(socket.SOL_SOCKET, size, BUFFER)
     except BaseException:
         here.close()
         raise

@@ -13,6 +13,7 @@ import pytest
 from holozen.command import local_stop
 from holozen.command.local_stop import HANGS, TURNS, LocalStop, LocalStops, Served
 from holozen.command.outcome import UNKNOWN_CALLER
+from holozen.testing import wait_for
 
 Make = Callable[..., LocalStops]
 
@@ -107,6 +108,20 @@ def test_a_stop_that_is_obeyed_while_it_is_written_is_confirmed(make: Make) -> N
     assert stop_here(["here"], [], "Ann") == [LocalStop("Kiwi", "Kiwi", "1a", True, "")]
 
 
+def test_more_answers_than_a_socket_holds_come_all_the_same(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A caller that is held up reads none until all have been written."""
+    monkeypatch.setattr(local_stop, "HELD_UP", 0.0)
+    monkeypatch.setattr(local_stop, "ATTEMPTS", 10_000)
+    names, written = [f"bot{number:02}" for number in range(30)], list[str]()
+    for name in names:
+        make(name, write=lambda robot, _by: written.append(robot))
+    with local_stop.stop_here(["here"], [], "Ann") as answers:
+        wait_for(lambda: sorted(written) == names)
+        assert sorted(one.robot for one in answers.read(30.0)) == names
+
+
 def test_a_stop_by_nobody_is_kept_as_a_stop(make: Make) -> None:
     written = list[str]()
     make("Fred", write=lambda _robot, by: written.append(by))
@@ -125,6 +140,7 @@ def test_nobody_else_can_reach_the_socket_and_none_is_left_behind(
         with killed, monkeypatch.context() as there:
             there.chdir(folder)
             killed.bind(dead)  # and nobody removes it
+            os.utime(dead, (0, 0))
     stop_here(["here"], [], "Ann")
     one.close()
     assert [*folder.iterdir()] == []
