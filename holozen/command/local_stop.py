@@ -299,10 +299,8 @@ def _is_gone(path: Path) -> bool:
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end, _address(path) as address:
             end.connect(address)
-    except (ConnectionRefusedError, FileNotFoundError):
-        return True
-    except OSError:  # that cannot be known now
-        return False
+    except OSError as error:  # with another, that cannot be known now
+        return isinstance(error, ConnectionRefusedError | FileNotFoundError)
     return False
 
 

@@ -9,7 +9,7 @@ from holozen.messages import Odometry
 from holozen.testing import wait_for
 from holozen.transport.pubsub import Latest
 
-from .conftest import is_soon
+from .conftest import insist
 
 STANDS, MOVES = 0.01, 0.1  # m/s or rad/s
 # m; what a robot at 0.5 m/s goes in the 0.5 s that a stop may take, and a little
@@ -91,12 +91,11 @@ def drive(
 ) -> None:
     """Hold what moves the robot; again if the browser was too busy to keep it held."""
 
-    def tried() -> bool:
+    def again() -> None:
         end()
         begin()
-        return is_soon(lambda: has_signs(odom, signs))
 
-    wait_for(tried, 20, f"the robot to move {signs}")
+    insist(again, lambda: has_signs(odom, signs), f"the robot to move {signs}")
 
 
 def tap(page: Page, key: str, odom: Latest[Odometry]) -> None:

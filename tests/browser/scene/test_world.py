@@ -17,7 +17,7 @@ from holozen.spawning import SpawnPose, spawn_file
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.pubsub import Latest
 
-from ..conftest import insist, is_soon, press
+from ..conftest import insist, press
 from ..driving import place, stands, tap
 from .pixels import NEAR, SIZE, TOP, choose, colored, deck, pixel, put, shows_it_at
 
@@ -77,12 +77,12 @@ def test_the_picture_on_an_object_is_drawn_upright(page: Page, bus: Bus, tmp_pat
 def test_a_click_on_a_robot_chooses_it(page: Page, bus: Bus) -> None:
     spawn_file(bus, data.find("urdf", "mecanum.urdf.xacro"), "other", SpawnPose(x=0.2, y=1.0))
 
-    def chosen() -> bool:
-        x, y = pixel(0.2, 1.0, 0.1)
-        page.mouse.click(x, TOP + y)
-        return is_soon(page.locator("nav [aria-pressed=true]:text('other')").is_visible)
-
-    wait_for(chosen, 20, "the other robot to be chosen")
+    x, y = pixel(0.2, 1.0, 0.1)
+    insist(
+        lambda: page.mouse.click(x, TOP + y),
+        page.locator("nav [aria-pressed=true]:text('other')").is_visible,
+        "the other robot to be chosen",
+    )
     choose(page, "hb_bot")
     entities.delete(bus, "other")
 

@@ -14,6 +14,7 @@ from holozen.command.feedback import HELD, ONLY_TURNS, SILENT, STOP_FIRST, verdi
 from holozen.messages import CommandSource, CommandStatus, Twist
 from holozen.testing import Wire, wait_for
 from holozen.testing.process import PATIENCE
+from holozen.transport.pubsub import Publisher, Subscription
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -89,17 +90,19 @@ def test_a_command_to_a_joint_that_is_accepted_after_a_refusal_is_obeyed() -> No
         assert verdict_on_part(status, before, ME) == why
 
 
+def judge(wire: Wire) -> tuple[Bus, Subscription[Twist], Publisher[CommandStatus]]:
+    """A sim that reads commands and publishes what it makes of them."""
+    sim = wire.bus("sim")
+    return sim, sim.subscribe("cmd_vel", Twist), sim.publisher("cmd_vel_status", CommandStatus)
+
+
 def once(
     wire: Wire, run: Run, judged: Callable[[str], CommandStatus], value: str = "{}", code: int = 0
 ) -> str:
     """What `pub --once` reports of a value beside a sim that the teleop drives, whose next status
     `judged` gives. It ends with `code`.
     """
-    sim: Bus = wire.bus("sim")
-    commands, statuses = (
-        sim.subscribe("cmd_vel", Twist),
-        sim.publisher("cmd_vel_status", CommandStatus),
-    )
+    sim, commands, statuses = judge(wire)
     statuses.put(CommandStatus(obeyed=TELEOP))
 
     def answer() -> None:
@@ -118,11 +121,7 @@ def once(
 
 @pytest.mark.parametrize("why", ["late", "old"])
 def test_a_single_command_that_was_held_up_is_sent_again(wire: Wire, run: Run, why: str) -> None:
-    sim = wire.bus("sim")
-    commands, statuses = (
-        sim.subscribe("cmd_vel", Twist),
-        sim.publisher("cmd_vel_status", CommandStatus),
-    )
+    _, commands, statuses = judge(wire)
 
     def answer() -> None:
         source = commands.recv().source
@@ -208,11 +207,7 @@ def test_a_robot_that_is_gone_is_reported(
     wire: Wire, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("holozen.command.feedback.FRESH", 0.0)  # what came is old at each look
-    sim = wire.bus("sim")
-    commands, statuses = (
-        sim.subscribe("cmd_vel", Twist),
-        sim.publisher("cmd_vel_status", CommandStatus),
-    )
+    _, commands, statuses = judge(wire)
 
     def answer() -> None:
         source = commands.recv().source
