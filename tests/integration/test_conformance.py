@@ -111,7 +111,7 @@ class Naive:
 
 LACKS = {
     "watchdog": ("it_obeys_and_stops_in_silence", "is there a watchdog"),
-    "check": ("it_refuses_impossible_speeds", r"moves at 1 m/s after a speed of (nan|inf|1e\+300)"),
+    "check": ("it_refuses_impossible_speeds", "moves at 1 m/s after a speed of nan"),
     "priority": ("a_person_comes_first", "while a person commands|the robot to move back"),
     "stop": ("it_stands_while_it_is_stopped", "no reply from 'stop'"),
     "rate": ("its_odometry_is_steady_and_agrees_with_itself", "at least 10 Hz"),

@@ -67,12 +67,18 @@ def test_echo_prints_as_ros_does(verb: Verb, town: Wire, robot: Robot) -> None:
 
 
 def test_echo_as_json_is_one_object_a_line(town: Wire, robot: Robot) -> None:
-    echo = town.start("topic", "echo", "odom", "--json")
-    wait_for(lambda: echo.out.count("\n") >= 3)
+    def echoed() -> Process | None:
+        """None where a busy machine made it wait for the first."""
+        echo = town.start("topic", "echo", "odom", "--json")
+        wait_for(lambda: echo.out.count("\n") >= 3)
+        assert echo.interrupt() == 130
+        return None if WAITS in echo.err else echo
+
+    echo = wait_for(echoed)
+    assert echo is not None
     odoms = [json.loads(line) for line in echo.out.splitlines()[:3]]
     assert {odom["child_frame_id"] for odom in odoms} == {"footprint_link"}
-    assert echo.interrupt() == 130
-    assert all(line.startswith(WAITS) for line in echo.err.splitlines()), echo.err
+    assert echo.err == ""
 
 
 def test_echo_follows_a_key_expression(town: Wire, robot: Robot) -> None:
