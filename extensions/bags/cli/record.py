@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 FLUSH = 1.0  # s; a killed recorder loses at most what arrived since
 IDLE = 0.01  # s between two looks at an empty queue
+TAIL = 0.2  # s after Ctrl-C, in which Zenoh's threads read what had come in before it
 SILENT = 2.0  # s until the keys on which nothing has arrived are reported, once
 TOPICS = "; `holozen topic list` shows the topics"
 REPORT_EVERY = {True: 0.5, False: 5.0}  # s between two lines, in a terminal and elsewhere
@@ -110,6 +111,8 @@ def _record(args: argparse.Namespace, writer: "BagWriter", stop: threading.Event
                     lambda: latched.take(graph.endpoints()),
                     progress,
                 )
+                if stop.is_set():  # a process that was held up finds Ctrl-C before its samples
+                    time.sleep(TAIL)
                 intake.close()
                 while not writer.full and recorder.write_some():
                     pass
