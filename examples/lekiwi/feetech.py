@@ -21,6 +21,7 @@ SPEED_MODE = 1
 STEPS = 4096 / math.tau  # a radian
 ANSWER = 0.05  # s; a servo answers within 1 ms, a USB adapter or a busy computer delays that
 TRIES = 3  # requests without an answer, after which a servo is taken to be gone
+FIRST_TRIES = 20  # at the start, when nothing turns yet
 
 
 class ServoError(Exception):
@@ -76,7 +77,7 @@ class Servos:
                 (GOAL_SPEED, b"\0\0"),
                 (TORQUE, b"\1"),
             ):
-                self._ask(servo, WRITE, bytes((address,)) + value)
+                self._ask(servo, WRITE, bytes((address,)) + value, FIRST_TRIES)
 
     def turn(self, rates: Mapping[int, float]) -> None:
         """From now on, let servos turn at `rates` (rad/s). It does not wait for an answer."""
@@ -87,9 +88,9 @@ class Servos:
         """The rate (rad/s) at which a servo turns."""
         return rate_of(self._ask(servo, READ, bytes((SPEED, 2))))
 
-    def _ask(self, servo: int, instruction: int, parameters: bytes) -> bytes:
+    def _ask(self, servo: int, instruction: int, parameters: bytes, tries: int = TRIES) -> bytes:
         """The parameters of a servo's answer."""
-        for _ in range(TRIES):
+        for _ in range(tries):
             if (answer := self._try(servo, instruction, parameters)) is not None:
                 return answer
         raise ServoError(
