@@ -353,7 +353,8 @@ def test_a_view_that_only_looks_takes_nothing(town: Wire, view: Callable[..., st
             await foxglove.until(lambda: any("--look-only" in text for text in foxglove.statuses))
 
     asyncio.run(look(view("--look-only")))
-    assert town.run("param", "get", "sim", "max_linear").stdout.split()[-1] == "5.0"
+    done = town.run("param", "get", "sim", "max_linear")
+    assert done.stdout.split()[-1:] == ["5.0"], done
 
 
 def test_a_token_is_needed_and_then_any_page_may_connect(view: Callable[..., str]) -> None:
