@@ -212,6 +212,8 @@ def drive(args: argparse.Namespace, layout: "Layout") -> int:
                     TeleopApp(session, terminal, telemetry, joystick, plain, ascii, colour).run()
                 finally:
                     session.halt()  # before the terminal is restored, which may be gone
+        except KeyboardInterrupt:
+            return 0
         except TeleopError as error:
             report(f"teleop: {error}")
             return 2
@@ -224,7 +226,8 @@ def drive(args: argparse.Namespace, layout: "Layout") -> int:
 
 
 def _quit(_number: int, _frame: object) -> None:
-    raise SystemExit(0)
+    """End by what `interrupt_again` raises again where a callback of the interpreter lost it."""
+    raise KeyboardInterrupt
 
 
 def read_script(args: argparse.Namespace, layout: "Layout") -> int:

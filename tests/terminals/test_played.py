@@ -277,7 +277,7 @@ BREATHS = (
         for apart in (0.0, 0.01)
     ]
     if OFTEN > 1
-    else [(KITTY, 0.0, 0.0), (KITTY, 0.0, 0.01), (XTERM, 0.1, 0.0)]
+    else [(KITTY, 0.0, 0.01), (XTERM, 0.1, 0.0)]
 )
 NAMES = {KITTY: "kitty", XTERM: "xterm", TMUX: "tmux"}
 
@@ -476,31 +476,43 @@ def test_an_end_before_the_terminal_answered_leaves_it_tidy(town: Wire) -> None:
 EARLY = """
 import os, sys
 sys.path.insert(0, {root!r})
-from services.teleop import __main__ as teleop
+from holozen.cli import main
 import services.teleop.{module} as part
 before = {name}
+number = int(sys.argv.pop(1))
+def signals():
+    os.kill(os.getpid(), number)
+class Dying:
+    def __del__(self):
+        signals()
 def early(*given):
     {name} = before
     before(*given)
-    os.kill(os.getpid(), int(sys.argv[1]))
+    {how}()
 {name} = early
-sys.exit(teleop.main(sys.argv[2:]))
+sys.argv.insert(1, "teleop")
+main()
 """
 
 
 @pytest.mark.parametrize(
-    ("number", "module", "name"),
+    ("number", "module", "name", "how"),
     [
-        (signal.SIGINT, "input.terminal", "part.Terminal.write"),
-        (signal.SIGHUP, "app", "part.TeleopApp.__init__"),
+        (signal.SIGINT, "input.terminal", "part.Terminal.write", "signals"),
+        (signal.SIGHUP, "app", "part.TeleopApp.__init__", "signals"),
+        (signal.SIGTERM, "app", "part.TeleopApp.__init__", "Dying"),
     ],
-    ids=["while the terminal is set up", "while the application is made"],
+    ids=[
+        "while the terminal is set up",
+        "while the application is made",
+        "in a callback of the interpreter",
+    ],
 )
 def test_a_signal_at_the_very_start_leaves_the_terminal_tidy(
-    town: Wire, tmp_path: Path, number: signal.Signals, module: str, name: str
+    town: Wire, tmp_path: Path, number: signal.Signals, module: str, name: str, how: str
 ) -> None:
     script = tmp_path / "early.py"
-    script.write_text(EARLY.format(root=str(ROOT), module=module, name=name))
+    script.write_text(EARLY.format(root=str(ROOT), module=module, name=name, how=how))
     with Played([sys.executable, str(script), str(int(number)), *town.flags], KITTY) as terminal:
         assert terminal.process.wait() == 0
         assert terminal.modes() == terminal.modes_before
