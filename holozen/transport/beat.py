@@ -246,13 +246,16 @@ class Echoes(Declared):
     """What the commands on one `key` return: the newest beat of each receiver there that was heard,
     at most MAX_ECHOES.
 
-    `tokens` is a subscription to the tokens of the receivers of the key. It may be used from any
-    thread.
+    `tokens` is a subscription to the tokens of the receivers of the key, and `matched` returns
+    whether anyone subscribes to it. It may be used from any thread.
     """
 
-    def __init__(self, key: str, hearing: Hearing, tokens: Any) -> None:
+    def __init__(
+        self, key: str, hearing: Hearing, tokens: Any, matched: Callable[[], bool] = lambda: False
+    ) -> None:
         super().__init__(tokens)
         self.key, self._hearing, self._tokens = key, hearing, tokens.handler.try_recv
+        self._matched = matched
         self._holders: dict[str, set[str]] = {}  # the tokens of each session
         self._watched: dict[str, Receiver] = {}
         self._vouched: dict[str, int] = {}  # what was echoed last by `vouched`
@@ -320,14 +323,24 @@ class Echoes(Declared):
     def settle(self, timeout: float = SETTLE) -> None:
         """Until a beat was heard: wait for the receivers that are there to be known, and for a beat
         of one of them, at most `timeout` seconds. The first command does so, unless this was called
-        before it: with 0 where nothing may wait.
+        before it: with 0 where nothing may wait. Where those alone are there that have no tokens,
+        such as foreign ones, it takes all this time.
         """
         self._is_settled = True
         deadline = time.monotonic() + timeout
         if not self.heard and timeout:
             self._hearing.roll_call(timeout)
-        while self.awaited and time.monotonic() < deadline:
+        while (self.awaited or self._is_unknown()) and time.monotonic() < deadline:
             time.sleep(LOOK)
+
+    def _is_unknown(self) -> bool:
+        """Whether somebody subscribes, and no token of any is known: on a new link it may come
+        later.
+        """
+        with self._hearing.lock:
+            self._look()
+            is_known = bool(self._holders)
+        return not is_known and self._matched()
 
     def may_command(self) -> bool:
         """Whether a motion may be sent now: an echo goes with it, or nobody who beats is there. A

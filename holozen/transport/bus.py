@@ -4,6 +4,7 @@ server.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -93,9 +94,9 @@ class Bus(Node):
         """Our beats, by name."""
         return {}
 
-    def echoes(self, key: str) -> Echoes:
-        """What commands on `key` return of the beats of those who obey them. Raises BusError for a
-        wrong key.
+    def echoes(self, key: str, matched: Callable[[], bool] = lambda: False) -> Echoes:
+        """What commands on `key` return of the beats of those who obey them. `matched` as in
+        Echoes. Raises BusError for a wrong key.
         """
         with one_line(f"key {key!r}"):
             zenoh.KeyExpr(key)  # raises ZError; that of the token would name the token
@@ -108,7 +109,7 @@ class Bus(Node):
                 Hearing(name, tokens(self.session, beating), self._hear, call)
             )
         holders = tokens(self.session, f"@holozen/*/*/sub/*/*/*/{quoted(key)}", HOLDERS)
-        return self._keep(Echoes(key, self._hearings[name], holders))
+        return self._keep(Echoes(key, self._hearings[name], holders, matched))
 
     def _hear(self, key: str) -> tuple[Any, Any]:
         """A subscription to a beat, and the replies to a query for it."""
@@ -199,7 +200,7 @@ class Bus(Node):
             )
         watch = partial(publisher.declare_matching_listener, zenoh.handlers.RingChannel(1))
         sign = partial(self.member.attachment, key, priority) if self.member and commands else None
-        echoes = self.echoes(key) if commands else None
+        echoes = self.echoes(key, partial(_is_matched, publisher)) if commands else None
         writer = make(publisher, self.stamps(key), watch, sign, echoes)
         self._answer_gets(writer, key)
         if commands and dead_man:
@@ -371,6 +372,13 @@ class Bus(Node):
         """
         _check_call(key, request, reply, timeout)
         return services.call(self, key, request, reply, timeout, everyone=True)
+
+
+def _is_matched(publisher: Any) -> bool:
+    """Whether anyone subscribes to what a publisher of Zenoh's sends."""
+    with contextlib.suppress(zenoh.ZError):  # it was closed by another thread
+        return bool(publisher.matching_status.matching)
+    return False
 
 
 def _of_all(key: str) -> str:

@@ -188,6 +188,30 @@ def test_who_waits_again_hears_a_receiver_that_came_meanwhile(wire: Wire) -> Non
         assert sender.echoes.heard
 
 
+def test_who_subscribes_and_is_not_known_yet_is_waited_for(wire: Wire) -> None:
+    robot, driver = wire.bus("robot"), wire.bus("driver")
+    beat, commands = robot.beat(), driver.publisher("cmd_vel", Twist)
+    assert commands.echoes
+    robot.subscribe_raw("cmd_vel")
+    wait_for(lambda: commands.matched, what="a match")
+    began = Event()
+
+    def tell() -> None:
+        """Announce the subscription while the driver waits."""
+        began.wait()
+        Event().wait(0.2)
+        tokens.append(robot.announce("sub", "geometry_msgs/msg/Twist", "cmd_vel"))
+
+    tokens: list[object] = []
+    telling = Thread(target=tell)
+    telling.start()
+    with beating(beat):
+        began.set()
+        commands.echoes.settle(10.0)
+        assert commands.echoes.heard
+    telling.join()
+
+
 def test_who_has_a_match_knows_of_whom_to_expect_a_beat(
     wire: Wire, monkeypatch: pytest.MonkeyPatch
 ) -> None:
