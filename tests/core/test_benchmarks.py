@@ -66,12 +66,17 @@ CASES = {
 NEEDS = {"record": "record", "rclpy": "run"}
 """Benchmark -> the verb whose extension it needs."""
 CASES = {name: cases for name, cases in CASES.items() if NEEDS.get(name, "sim") in VERBS}
+RARE = {"cli", "startup", "key_to_motion", "fleet"}
+"""Those that take longest; scripts/test --long has them."""
+if not LONG:
+    CASES = {name: cases for name, cases in CASES.items() if name not in RARE}
 if LONG and shutil.which("chromium"):  # which takes as long to start as all others run
     CASES["key_to_motion"] |= dict.fromkeys(IN_PAGE, CASES["key_to_motion"]["to rest"])
 else:
     FLAGS["key_to_motion"] = ["--terminal"]
 if not find_spec("pybullet"):
-    del CASES["sim_loop"], CASES["fleet"]  # they are measured beside that engine
+    # they are measured beside that engine
+    CASES = {name: cases for name, cases in CASES.items() if name not in ("sim_loop", "fleet")}
 
 
 def run(name: str, *words: str) -> str:

@@ -162,11 +162,6 @@ def test_a_person_attaches_and_detaches_and_the_robot_stands(
     wait_for(lambda: watcher.driven_by("controller"), what="the controller to go on")
 
 
-def test_a_teleop_without_a_terminal_reports_it(stack: Stack) -> None:
-    with pytest.raises(AssertionError, match=r"exit code 2\n(.*\n)*teleop: needs a terminal"):
-        stack.compose("run", "--rm", "-T", "teleop")
-
-
 def test_a_sim_that_is_killed_is_started_again_and_the_others_carry_on(
     stack: Stack, watcher: Watcher
 ) -> None:

@@ -91,16 +91,15 @@ def forge(bus: Bus, payload: str, names: int, priority: zenoh.Priority) -> None:
         )
 
 
-@pytest.mark.parametrize("payload", ['{"linear": {"x": -1}}', "{}"], ids=["go back", "stop"])
 def test_a_flood_of_names_at_the_lowest_priority_holds_no_person(
-    wire: Wire, statuses: Statuses, payload: str
+    wire: Wire, statuses: Statuses
 ) -> None:
     person = Person(wire.bus("teleop", lasting=True))
     try:
         statuses.wait_for(person.source)
 
         def flooded() -> bool:
-            forge(statuses.bus, payload, NAMES, zenoh.Priority.BACKGROUND)
+            forge(statuses.bus, "{}", NAMES, zenoh.Priority.BACKGROUND)
             return sum(statuses.next().refused.values()) >= 0.5 * NAMES
 
         wait_for(flooded)  # again where a busy sim missed most of them

@@ -49,7 +49,7 @@ def test_a_process_gets_in_over_a_slow_link(wire: Wire, proxy: Proxy) -> None:
 def test_over_a_slow_link_a_verb_sees_the_nodes_and_reports_what_it_waits_for_and_a_stop_reaches_the_robot(  # noqa: E501
     wire: Wire, proxy: Proxy
 ) -> None:
-    wire.start("sim").wait_for_line("listens on")
+    wire.start("sim", "--rtf", "0.2").wait_for_line("listens on")
     proxy.set(delay=DELAY)
     waited = {"client": "a Zenoh router at", "peer": "an answer from"}
     with ExitStack() as ends:
@@ -76,8 +76,8 @@ def test_what_waits_for_an_answer_ends_at_once_on_a_signal(wire: Wire, proxy: Pr
     proxy.set(delay=3600)
     where = ("--connect", proxy.endpoint, "--listen", "tcp/127.0.0.1:0")
     with (
-        Process(command("sim", "--mode", "client", *where)) as client,
-        Process(command("sim", "--mode", "peer", *where)) as peer,
+        Process(command("sim", "--rtf", "0.2", "--mode", "client", *where)) as client,
+        Process(command("sim", "--rtf", "0.2", "--mode", "peer", *where)) as peer,
     ):
         for sim, number in ((client, signal.SIGINT), (peer, signal.SIGTERM)):
             sim.wait_for_line("waiting for a")
@@ -115,7 +115,7 @@ def test_processes_meet_though_others_do_not_answer(wire: Wire, others: str) -> 
     else:
         asleep(wire)
         asleep(wire)
-    wire.start("sim").wait_for_line("listens on")
+    wire.start("sim", "--rtf", "0.2").wait_for_line("listens on")
     verbs = [("topic", "list"), ("topic", "echo", "odom", "--once", "--timeout", "20"), ("stop",)]
     topics, echo, stop = (wire.start(*words) for words in verbs)
 
@@ -139,7 +139,7 @@ def test_processes_meet_though_others_do_not_answer(wire: Wire, others: str) -> 
 
 def test_a_sleeper_that_wakes_up_meets_the_nodes_that_met_without_it(wire: Wire) -> None:
     sleeper = asleep(wire)
-    wire.start("sim").wait_for_line("listens on")
+    wire.start("sim", "--rtf", "0.2").wait_for_line("listens on")
     sleeper.signal(signal.SIGCONT)
     wait_for(lambda: wire.run("node", "list").stdout.split() == ["pose_service", "sim"], 20)
 
@@ -222,7 +222,7 @@ def test_an_access_control_list_has_to_allow_the_tokens_of_nodes(
         command("router", "--config", str(path), "--cfg", "scouting/multicast/enabled:false")
     ) as router:
         router.wait_for_line("listens at")
-        with Process(command("sim", *client)) as sim, ThreadPoolExecutor() as pool:
+        with Process(command("sim", "--rtf", "0.2", *client)) as sim, ThreadPoolExecutor() as pool:
             sim.wait_for_line("listens on")
             listed, stop = pool.map(lambda verb: run(command(*verb, *client), 60), VERBS)
     assert stop.stdout in STOPPED

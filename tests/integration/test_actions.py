@@ -202,12 +202,10 @@ def test_a_controller_that_ends_and_a_sim_that_dies_end_the_goal(wire: Wire) -> 
 @pytest.mark.parametrize(
     ("verbs", "reason"),
     [
-        ([("sim", "reset", "--scope", "time")], RESET),
         ([("sim", "reset", "--scope", "state")], RESET),
-        ([(*SPAWN, "--replace")], REMOVED),
         ([("delete", "Fred"), SPAWN], REMOVED),
     ],
-    ids=["time", "state", "replaced", "deleted and spawned"],
+    ids=["state", "deleted and spawned"],
 )
 def test_a_goal_is_not_driven_to_by_the_next_robot_or_after_a_reset(
     freds: Wire, verb: Verb, verbs: list[tuple[str, ...]], reason: str

@@ -332,12 +332,12 @@ def test_steps_end_with_ctrl_c_and_with_their_timeout(
         interrupted.err,
     )
     stands(sim)
-    late = verb(town, "sim", "step", "10000000", "--timeout", "1")
+    late = verb(town, "sim", "step", "10000000", "--timeout", "0.5")
     while "no step was made" in late.stderr:  # a busy machine took longer to begin
-        late = verb(town, "sim", "step", "10000000", "--timeout", "1")
+        late = verb(town, "sim", "step", "10000000", "--timeout", "0.5")
     assert late.returncode == 1
     assert re.fullmatch(
-        r"holozen sim: not done within 1 s, and ended: the goal was cancelled, \d+ steps before "
+        r"holozen sim: not done within 0.5 s, and ended: the goal was cancelled, \d+ steps before "
         r"the last one; "
         r"--timeout gives them longer\n",
         late.stderr,

@@ -56,7 +56,7 @@ def begun(line: str) -> Iterator[Process | Terminal]:
             terminal.wait_for_text(text)
             yield terminal
         return
-    with Process(words, env={"PYTHONUNBUFFERED": "1"}) as process:
+    with Process(words) as process:
         process.wait_for_line(text, within=40)
         yield process
 

@@ -21,7 +21,7 @@ OF_FIRST, OF_SECOND = "bot4", "bot0"  # of two shards
 @pytest.fixture(scope="module")
 def shards(town: Wire) -> tuple[Process, Process]:
     """Two shards with a fleet of six."""
-    first, second = town.start("sim", "--shard", "1/2"), town.start("sim", "--shard", "2/2")
+    first, second = (town.start("sim", "--rtf", "0.2", "--shard", f"{one}/2") for one in (1, 2))
     for shard in (first, second):
         shard.wait_for_line("this is shard")
     done = town.run(*SPAWN, str(BOT), "--count", "6", "--grid", "2")

@@ -96,19 +96,6 @@ WRITTEN: dict[str, Callable[[str], list[str]]] = {
 }
 
 
-def test_a_stop_outlasts_other_words_for_the_same_network(wire: Wire, tmp_path: Path) -> None:
-    sim, bus = start(wire, tmp_path), wire.bus("person")
-    ask(bus, "Fred/stop")
-    sim.kill()
-    for words in WRITTEN.values():
-        with Process(
-            [*command("sim", *ROBOTS, "--state", str(tmp_path)), *words(wire.endpoint)]
-        ) as sim:
-            sim.wait_for_line("sim: Fred is still stopped by person@")
-            sim.wait_for_line("Ann listens on")
-            assert "Ann is still" not in sim.err
-
-
 def test_a_robot_whose_file_is_damaged_is_stopped_until_its_release(
     wire: Wire, tmp_path: Path
 ) -> None:

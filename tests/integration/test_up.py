@@ -132,13 +132,6 @@ def test_a_terminal_that_is_closed_ends_all_with_a_stop_of_the_robot(wire: Wire)
     robot.wait_for_stop_command()
 
 
-def test_killed_in_a_terminal_it_leaves_no_process(wire: Wire) -> None:
-    terminal = wire.terminal("up")
-    terminal.wait_for_text("controller@")
-    terminal.process.kill()
-    wait_for_none(wire)
-
-
 def test_a_killed_teleop_ends_all_and_leaves_the_terminal_tidy(wire: Wire) -> None:
     terminal = wire.terminal("up")
     terminal.wait_for_text("controller@")

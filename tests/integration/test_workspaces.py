@@ -7,29 +7,17 @@ import pytest
 
 from holozen import entities
 from holozen.testing import Wire
-from tests.students import MIXED, ROS_1, ROS_2, hb_bot, workspace
+from tests.students import MIXED, ROS_2, hb_bot, workspace
 
 from .conftest import SPAWN, Verb
 from .robots import Robot, distance, place
 
 BOTS = {
-    "cloned under another name, ROS 1, CRLF": (
-        "eyrc_hb",
-        hb_bot("hb_task_1b", ROS_1),
-        None,
-        "\r\n",
-    ),
     "with a package.xml, ROS 2": ("ws/src/holo", hb_bot("holo", ROS_2), "holo", "\n"),
     "mixed tags, a frame that is none": (
         "hb_task_1b",
         hb_bot("hb_task_1b", MIXED, frame="chasis"),
         "hb_task_1b",
-        "\n",
-    ),
-    "wheels and axes turned round": (
-        "ws",
-        hb_bot("holo", turn=1.0, axis="0 -1 0", names=("a", "b", "c")),
-        None,
         "\n",
     ),
 }

@@ -50,6 +50,7 @@ QUICK = Gains(
     max_speed=2, max_turn=5, max_acceleration=10, max_turn_acceleration=20, linear=3, angular=3
 )
 MARK = 123.456  # m
+STATUS_EVERY = 20  # steps between two statuses of the sim, unless its clock is set back
 STEP = 0.01  # s of the robot's clock between two odoms
 AHEAD = 0.1  # s of that clock that a robot moves on before it waits for the next command
 STALE = 3.0  # s without odom; a busy machine may hold it up for longer than a controller waits
@@ -75,6 +76,7 @@ class Robot:
         self._moves_until = 0.0  # s of its clock
         # Set back to 0, it is not soon as late again: a busy machine may look late.
         self.time, self.epoch = 1000.0, 0
+        self._steps, self._told = 0, -1  # -1: no epoch was published
         self.resets: deque[Callable[[Robot], None]] = deque()  # to be done in its thread
 
     def status(self, **fields: object) -> bool:
@@ -107,7 +109,10 @@ class Robot:
         turned = Quaternion(0, 0, math.sin(self.pose[2] / 2), math.cos(self.pose[2] / 2))
         pose = PoseWithCovariance(Pose(Point(self.pose[0], self.pose[1]), turned))
         twist = TwistWithCovariance(Twist.planar(*self._velocity))
-        self._sim.put(SimulationStatus(epoch=self.epoch))
+        self._steps += 1
+        if self.epoch != self._told or self._steps % STATUS_EVERY == 0:
+            self._told = self.epoch
+            self._sim.put(SimulationStatus(epoch=self.epoch))
         self._odom.put(Odometry(Header(Time.of(self.time)), pose=pose, twist=twist))
 
 

@@ -41,15 +41,16 @@ KINDS = (
     "float64",
     "string",
 )
+SECOND = ("uint8", "int16", "float32", "float64", "string")  # one of each alignment
 ARRAYS = (("", 0), ("fixed", 3), ("sequence", 0), ("bounded", 5))
 
 
 def odd_types() -> list[Interface]:
-    """Types whose fields lie at odd places: each pair of kinds after a byte, in every kind of
-    array, and nested.
+    """Types whose fields lie at odd places: each kind after a byte, before one of each
+    alignment, in every kind of array, and nested.
     """
     made = []
-    for number, (first, second) in enumerate(itertools.product(KINDS, KINDS)):
+    for number, (first, second) in enumerate(itertools.product(KINDS, SECOND)):
         array, bound = ARRAYS[number % 4]
         fields = (
             Field("a", "uint8"),
@@ -76,7 +77,7 @@ TOGETHER = 10  # of these have their values drawn at once, which is quicker
 
 
 def test_another_library_writes_and_reads_the_same_bytes(rosbags: Rosbags) -> None:
-    """Types of every kind with 15 values each; and fields at odd places, which are aligned, with
+    """Types of every kind with 6 values each; and fields at odd places, which are aligned, with
     2.
     """
 
@@ -96,7 +97,7 @@ def test_another_library_writes_and_reads_the_same_bytes(rosbags: Rosbags) -> No
 
     for name in SOME:
         interface = REGISTRY.find(name)
-        settings(max_examples=15)(given(st.just(interface), values(interface))(agree))()
+        settings(max_examples=6)(given(st.just(interface), values(interface))(agree))()
     for first in range(0, len(ODD), TOGETHER):
         some = [st.tuples(st.just(odd), values(odd)) for odd in ODD[first : first + TOGETHER]]
         settings(max_examples=2)(given(st.tuples(*some))(agree_all))()

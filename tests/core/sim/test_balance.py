@@ -83,8 +83,8 @@ def rider(ground: World) -> Rider:
     return Rider(ground, wheely())
 
 
-def test_it_stands_for_half_a_minute(rider: Rider) -> None:
-    rider.drive(30)
+def test_it_stands_for_ten_seconds(rider: Rider) -> None:
+    rider.drive(10)
     assert rider.most < 0.01
     assert rider.place == pytest.approx((0, 0, 0), abs=2e-3)
 

@@ -3,7 +3,7 @@ left over.
 """
 
 import pyte
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from services.teleop.screen import BEGIN, END
@@ -153,6 +153,7 @@ def test_without_colours_none_is_written() -> None:
     assert not [code for code in range(30, 50) if f";{code}" in text or f"[{code}m" in text]
 
 
+@settings(max_examples=15)
 @given(st.lists(LINES, max_size=4))
 def test_after_any_pictures_the_terminal_shows_the_last_as_if_it_were_the_first(
     pictures: list[list[Line]],

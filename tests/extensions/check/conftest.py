@@ -10,6 +10,9 @@ import pytest
 from holozen.check.mistake import Finding
 from holozen.check.report import check
 from holozen.robot.files import reader
+from tests.expansions import forked
+
+__all__ = ["forked"]
 
 Findings = Callable[..., list[Finding]]
 
@@ -54,7 +57,7 @@ def check_here(path: Path, **options: Any) -> list[Finding]:
 
 
 @pytest.fixture
-def findings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Findings:
+def findings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, forked: None) -> Findings:
     """The findings in a text, saved under a name in an empty folder."""
     for variable in (
         "AMENT_PREFIX_PATH",
