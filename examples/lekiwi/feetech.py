@@ -86,9 +86,9 @@ class Servos:
 
     def rate(self, servo: int) -> float:
         """The rate (rad/s) at which a servo turns."""
-        return rate_of(self._ask(servo, READ, bytes((SPEED, 2))))
+        return rate_of(self._ask(servo, READ, bytes((SPEED, 2)), TRIES))
 
-    def _ask(self, servo: int, instruction: int, parameters: bytes, tries: int = TRIES) -> bytes:
+    def _ask(self, servo: int, instruction: int, parameters: bytes, tries: int) -> bytes:
         """The parameters of a servo's answer."""
         for _ in range(tries):
             if (answer := self._try(servo, instruction, parameters)) is not None:

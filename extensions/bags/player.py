@@ -25,7 +25,7 @@ from holozen.transport.pubsub import RawPublisher
 STOPS, STOP_EVERY = 5, 0.02  # s; several stops, since a congested link may drop some
 SETTLE = 0.3  # s for subscribers to match of which none is announced, such as foreign ones
 LINK_WAIT = 2.0  # s for those to match that are announced; they would miss the first messages
-BEAT_WAIT = 2.0  # s for a robot's first beat; the commands before it would be lost
+BEAT_WAIT = 2.0  # s for the first beats of robots; the commands before them would be lost
 LOOK = 0.05  # s between two polls of the keyboard and of `stop`
 GAP = 0.5  # s between two looks; after more the process was suspended
 ANY = "any/msg/Any"  # the type of a channel that has none
@@ -186,9 +186,10 @@ class Outlet:
         start = time.monotonic()
         while not self._is_matched(time.monotonic() - start):
             time.sleep(0.005)
+        deadline = time.monotonic() + BEAT_WAIT
         for route in self._routes.values():
             if route.publisher.echoes:
-                route.publisher.echoes.settle(BEAT_WAIT)
+                route.publisher.echoes.settle(max(0.0, deadline - time.monotonic()))
 
     def _is_matched(self, waited: float) -> bool:
         """Whether those match that are awaited, or were for long enough. `waited` in s."""

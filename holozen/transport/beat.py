@@ -261,7 +261,7 @@ class Echoes(Declared):
         self._vouched: dict[str, int] = {}  # what was echoed last by `vouched`
         self.was_heard = False  # whether any was heard when the last command was sent
         self._turn = 0  # of `hearing`, when it was last looked at
-        self._is_settled = False
+        self._is_settled = self._has_waited = False  # the latter: for who subscribes, not beats
         self._waits_since: float | None = None  # s, monotonic; None: it does not wait
         self._has_reported = False
 
@@ -323,24 +323,21 @@ class Echoes(Declared):
     def settle(self, timeout: float = SETTLE) -> None:
         """Until a beat was heard: wait for the receivers that are there to be known, and for a beat
         of one of them, at most `timeout` seconds. The first command does so, unless this was called
-        before it: with 0 where nothing may wait. Where those alone are there that have no tokens,
-        such as foreign ones, it takes all this time.
+        before it: with 0 where nothing may wait.
+
+        Where somebody subscribes, and none who beats is known, one may be about to be: so it waits
+        too, once. That takes all this time beside those alone who never beat, such as foreign
+        programs and recorders.
         """
         self._is_settled = True
         deadline = time.monotonic() + timeout
         if not self.heard and timeout:
             self._hearing.roll_call(timeout)
-        while (self.awaited or self._is_unknown()) and time.monotonic() < deadline:
+        while timeout and not self._has_waited and not self.has_receiver and self._matched():
+            self._has_waited = time.monotonic() >= deadline
             time.sleep(LOOK)
-
-    def _is_unknown(self) -> bool:
-        """Whether somebody subscribes, and no token of any is known: on a new link it may come
-        later.
-        """
-        with self._hearing.lock:
-            self._look()
-            is_known = bool(self._holders)
-        return not is_known and self._matched()
+        while self.awaited and time.monotonic() < deadline:
+            time.sleep(LOOK)
 
     def may_command(self) -> bool:
         """Whether a motion may be sent now: an echo goes with it, or nobody who beats is there. A

@@ -202,10 +202,10 @@ def drive(args: argparse.Namespace, layout: "Layout") -> int:
     with open_bus(args) as bus:
         session = open_session(args, bus, layout)
         telemetry = Telemetry(session)
-        for number in ENDS:
-            # until the app handles them: the terminal must be restored
-            signal.signal(number, _quit)
         try:
+            for number in ENDS:
+                # until the app handles them: the terminal must be restored
+                signal.signal(number, _quit)
             with Terminal(full=not plain) as terminal:
                 colour = not os.environ.get("NO_COLOR")
                 try:
@@ -226,7 +226,7 @@ def drive(args: argparse.Namespace, layout: "Layout") -> int:
 
 
 def _quit(_number: int, _frame: object) -> None:
-    """End by what `interrupt_again` raises again where a callback of the interpreter lost it."""
+    """Raise what `interrupt_again` raises again where a callback of the interpreter swallows it."""
     raise KeyboardInterrupt
 
 

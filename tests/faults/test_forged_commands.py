@@ -80,14 +80,14 @@ class Statuses:
         return found
 
 
-def forge(bus: Bus, payload: str, names: int, priority: zenoh.Priority) -> None:
+def forge(bus: Bus, names: int, priority: zenoh.Priority) -> None:
     """Publish forged commands, fast, but not so fast that the sim misses most of them: it reads the
     newest 64 between two steps.
     """
     for number in range(names):
         time.sleep(0.02 * (number % 30 == 29))
         bus.session.put(
-            "cmd_vel", payload, attachment=f"forged{number}@{number:06x}", priority=priority
+            "cmd_vel", "{}", attachment=f"forged{number}@{number:06x}", priority=priority
         )
 
 
@@ -99,7 +99,7 @@ def test_a_flood_of_names_at_the_lowest_priority_holds_no_person(
         statuses.wait_for(person.source)
 
         def flooded() -> bool:
-            forge(statuses.bus, "{}", NAMES, zenoh.Priority.BACKGROUND)
+            forge(statuses.bus, NAMES, zenoh.Priority.BACKGROUND)
             return sum(statuses.next().refused.values()) >= 0.5 * NAMES
 
         wait_for(flooded)  # again where a busy sim missed most of them

@@ -6,6 +6,7 @@ one.
 
 import itertools
 import json
+import os
 import re
 import shlex
 import socket
@@ -292,6 +293,22 @@ def test_as_json_it_is_one_object_a_line(busy: Wire, files: Files) -> None:
             f"{name}: {done.stdout}"
         )
         assert is_clean(done.stderr), f"{name}: {done.stderr}"
+
+
+def test_a_reader_that_is_gone_ends_it_quietly(busy: Wire, files: Files) -> None:
+    def attempt(name: str) -> Done:
+        reading, writing = os.pipe()
+        os.close(reading)
+        row = VERBS[name]
+        with open(writing, "wb") as gone:
+            return run(
+                [*files.words(name, row.live or "", "pipe"), "--json", *flags(row, busy)],
+                stdout=gone,
+            )
+
+    for name, done in tries(["node list", "list"], attempt):
+        assert done.returncode == 0, f"{name}: {done.stderr}"
+        assert is_clean(done.stderr) and "Broken pipe" not in done.stderr, f"{name}: {done.stderr}"
 
 
 def test_what_is_wrong_is_one_line(busy: Wire, files: Files, call: Verb) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import pytest
 
 from holozen import entities
+from holozen.messages import TwistStamped
 from holozen.spawning import SpawnPose, spawn_file
 from holozen.testing import Terminal, Wire, wait_for
 
@@ -14,7 +15,6 @@ from .robots import URDF, Robot, moves, place, planar
 
 V, W = 0.4, 0.8  # m/s, rad/s
 ESCAPE = "\x1b"
-UP = f"{ESCAPE}[A"
 
 
 @pytest.fixture(scope="module")
@@ -111,6 +111,33 @@ def test_without_another_key_the_robot_stops_after_the_key_timeout(
         robot.wait_for_stop_command()
         # At 20 Hz; after the default of 0.5 s it would be ten of them and more.
         assert sum(any(planar(command)) for command in commands.messages()) <= 6
+
+
+def test_a_repeat_rate_of_zero_sends_a_command_once(town: Wire, robot: Robot) -> None:
+    with start_teleop(town, "--repeat-rate", "0", "--mode", "latch") as terminal:
+
+        def sends_it_once() -> bool:
+            """Or stops too, where a busy machine lets it lose sight of the robot."""
+            commands = robot.commands.from_now()
+            after(robot, terminal, "i")
+            robot.pass_time(0.4)
+            sent = [planar(command) for command in commands.messages()]
+            terminal.type("k")
+            robot.wait_for_stop_command()
+            robot.stands()
+            return sent == [(0.5, 0, 0, 0)]
+
+        wait_for(sends_it_once, what="one command alone")
+
+
+def test_stamped_commands_carry_time_and_frame_and_drive_too(town: Wire, robot: Robot) -> None:
+    with start_teleop(town, "--stamped", "--frame-id", "base_link") as terminal:
+        commands = robot.commands.from_now()
+        terminal.hold_until("J", lambda: moves(robot.newest(), 0, 0.5, 0) and commands.messages())
+        command = commands.messages()[0]
+        assert isinstance(command, TwistStamped)
+        assert command.header.frame_id == "base_link"
+        assert command.header.stamp.sec > 0
 
 
 def test_the_teleop_shows_what_a_robot_cannot_do_and_the_limits_that_the_sim_has(

@@ -6,7 +6,6 @@ Each test has a network of its own, so that it meets no other robots and disturb
 import json
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -18,7 +17,6 @@ from .conftest import comes_to
 
 pytestmark = NEEDS
 
-ZENOH = str(Path(sys.executable).with_name("zenoh"))
 CLIENT = ("--mode", "client", "--connect", "tcp/127.0.0.1:7447")
 LOOPBACK, LISTENS = "0100007F", "0A"
 GROUP = "E00000E0"  # 224.0.0.224, as the kernel writes it

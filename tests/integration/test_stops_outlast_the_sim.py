@@ -2,7 +2,6 @@
 stopped, it is.
 """
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -76,24 +75,6 @@ def test_a_sim_that_is_started_again_or_joins_another_has_the_same_robots_stoppe
     sim.kill()
     start(wire, tmp_path)
     assert setter(bus, "Fred") == ""
-
-
-WRITTEN: dict[str, Callable[[str], list[str]]] = {
-    "the name of this machine": lambda point: [
-        "--connect",
-        point.replace("127.0.0.1", "localhost"),
-        "--listen",
-        point,
-    ],
-    "one more endpoint": lambda point: [
-        "--connect",
-        "tcp/127.0.0.1:1",
-        "--connect",
-        point,
-        "--listen",
-        point,
-    ],
-}
 
 
 def test_a_robot_whose_file_is_damaged_is_stopped_until_its_release(

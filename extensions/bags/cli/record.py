@@ -112,7 +112,7 @@ def _record(args: argparse.Namespace, writer: "BagWriter", stop: threading.Event
                     progress,
                 )
                 if stop.is_set():  # a process that was held up finds Ctrl-C before its samples
-                    time.sleep(TAIL)
+                    _until(threading.Event(), TAIL, recorder, writer, lambda: None, progress)
                 intake.close()
                 while not writer.full and recorder.write_some():
                     pass

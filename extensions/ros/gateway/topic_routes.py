@@ -138,7 +138,11 @@ class TopicRoutes:
         ages = _AgesOfWriters(
             lambda gid: stamps(self._source(theirs, gid), self._sides.bus.id, numbers)
         )
-        echoes = self._sides.bus.echoes(key) if is_command else None
+
+        def matched() -> bool:
+            return bool(publisher.matching_status.matching)
+
+        echoes = self._sides.bus.echoes(key, matched) if is_command else None
         if echoes:
             echoes.settle()
 

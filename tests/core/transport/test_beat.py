@@ -1,7 +1,7 @@
 """Receivers number their own time, senders return the newest number that they have heard."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import pairwise
 from threading import Event, Thread
@@ -188,28 +188,33 @@ def test_who_waits_again_hears_a_receiver_that_came_meanwhile(wire: Wire) -> Non
         assert sender.echoes.heard
 
 
-def test_who_subscribes_and_is_not_known_yet_is_waited_for(wire: Wire) -> None:
+@pytest.mark.parametrize("late", ["sub", "beat"])
+def test_who_subscribes_and_is_not_known_yet_is_waited_for(wire: Wire, late: str) -> None:
     robot, driver = wire.bus("robot"), wire.bus("driver")
-    beat, commands = robot.beat(), driver.publisher("cmd_vel", Twist)
+    commands, ends = driver.publisher("cmd_vel", Twist), Event()
     assert commands.echoes
+    announcing: dict[str, Callable[[], object]] = {
+        "sub": lambda: robot.announce("sub", "geometry_msgs/msg/Twist", "cmd_vel"),
+        "beat": robot.beat,
+    }
+    tokens = [announce() for kind, announce in announcing.items() if kind != late]
     robot.subscribe_raw("cmd_vel")
     wait_for(lambda: commands.matched, what="a match")
-    began = Event()
 
     def tell() -> None:
-        """Announce the subscription while the driver waits."""
-        began.wait()
-        Event().wait(0.2)
-        tokens.append(robot.announce("sub", "geometry_msgs/msg/Twist", "cmd_vel"))
+        """Announce the other while the driver waits."""
+        ends.wait(0.2)
+        tokens.append(announcing[late]())
+        with beating(robot.beat()):
+            ends.wait()
 
-    tokens: list[object] = []
     telling = Thread(target=tell)
     telling.start()
-    with beating(beat):
-        began.set()
-        commands.echoes.settle(10.0)
-        assert commands.echoes.heard
+    commands.echoes.settle(10.0)
+    heard = commands.echoes.heard
+    ends.set()
     telling.join()
+    assert heard
 
 
 def test_who_has_a_match_knows_of_whom_to_expect_a_beat(

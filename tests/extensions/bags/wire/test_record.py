@@ -120,7 +120,7 @@ def test_what_came_before_ctrl_c_is_recorded_by_a_recorder_that_was_held_up(
 ) -> None:
     recorder = wire.start("record", "a", "-o", str(tmp_path / "a"))
     session = listening(wire, "a")
-    sent = [b"%d" % i for i in range(1500)]
+    sent = [b"%d" % i for i in range(500)]
     session.put("a", sent[0], congestion_control=BLOCK)
     wait_for(partial(holds, tmp_path / "a.mcap", 1), what="the first to be flushed")
     recorder.signal(signal.SIGSTOP)
