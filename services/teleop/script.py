@@ -88,16 +88,17 @@ def run(steps: list[Step], session: Session, stop: threading.Event) -> str:
         if now > patience:
             return _nobody(session)
         session.tick(now)  # it finds a robot at the root by its name
+    now = time.monotonic()
     for step in steps:
-        now = time.monotonic()
         if not step.keys:
             session.let_go()
         for key in step.keys:
             session.take(Key(key, key, "press", key), now)
-        if why := _hold(session, now + step.seconds, stop):
+        why, now = _hold(session, now, step.seconds, stop)
+        if why:
             return why
         for key in step.keys:
-            session.take(Key(key, key, "release", key), time.monotonic())
+            session.take(Key(key, key, "release", key), now)
     return ""
 
 
@@ -115,26 +116,31 @@ def _nobody(session: Session) -> str:
     )
 
 
-def _hold(session: Session, until: float, stop: threading.Event) -> str:
-    """Drive until a time (s, monotonic). Returns why that was aborted, or ""."""
-    began = obeyed = now = time.monotonic()
+def _hold(
+    session: Session, began: float, seconds: float, stop: threading.Event
+) -> tuple[str, float]:
+    """Drive for some seconds from a time on, that of the last look at the clock (s, monotonic): a
+    pause since then counts. Returns why that was aborted, or "", and the time of the last look.
+    """
+    obeyed = now = began
     heard = False
-    while now < until:
+    while now < began + seconds:
         session.tick(now)
-        if stop.wait(min(TICK, until - now)):
-            return "ended by a signal"
+        if stop.wait(min(TICK, began + seconds - now)):
+            return "ended by a signal", now
         before, now = now, time.monotonic()
         if now - before > DOUBT:
-            return "it was paused, and the robot with it"
+            return "it was paused, and the robot with it", now
         status = session.client.status()
         why = _not_obeyed(session, status)
         obeyed = obeyed if why else now
         if session.warning or now - obeyed > DOUBT:
-            return session.warning or why
+            return session.warning or why, now
         heard |= status.obeyed == session.bus.source or not any(session.mapper.motion)
         if status.name and not heard and now - began > UNHEARD:
-            return "the sim has received no command; does it hang? `holozen doctor` looks why"
-    return ""
+            why = "the sim has received no command; does it hang? `holozen doctor` looks why"
+            return why, now
+    return "", now
 
 
 def _not_obeyed(session: Session, status: CommandStatus) -> str:

@@ -48,7 +48,7 @@ def test_without_a_terminal_the_controller_drives_the_square_and_the_page_of_a_v
     with urllib.request.urlopen(address) as page:
         assert b"holozen" in page.read()
     assert up.terminate(AT_MOST) == 0
-    assert parts_at(wire) == {}
+    wait_for_none(wire)
     with pytest.raises(urllib.error.URLError):
         urllib.request.urlopen(address)
     assert "Traceback" not in up.err
@@ -93,7 +93,7 @@ def test_a_part_that_hangs_is_killed_and_reported(wire: Wire) -> None:
     # of two signals that wait, the kernel delivers SIGTERM first
     wait_for(lambda: state_of(sim) == "T")
     assert up.interrupt(AT_MOST) == 0
-    assert parts_at(wire) == {}
+    wait_for_none(wire)
     assert "up: sim did not end within 0.5 s and was killed" in up.err
 
 
@@ -112,7 +112,7 @@ def test_in_a_terminal_it_shows_the_teleop_and_ctrl_c_ends_all(wire: Wire) -> No
     terminal.hold_until(",", teleop_drives)
     terminal.type("\x03")
     assert terminal.process.wait(AT_MOST) == 0
-    assert parts_at(wire) == {}
+    wait_for_none(wire)
     robot.wait_for_stop_command()
     assert terminal.modes() == terminal.modes_before
     assert "controller: yields to teleop@" in terminal.screen(), (
@@ -137,7 +137,7 @@ def test_a_killed_teleop_ends_all_and_leaves_the_terminal_tidy(wire: Wire) -> No
     terminal.wait_for_text("controller@")
     os.kill(parts_at(wire)["teleop"], signal.SIGKILL)
     terminal.process.wait()
-    assert parts_at(wire) == {}
+    wait_for_none(wire)
     assert terminal.modes() == terminal.modes_before
     assert terminal.raw.rfind("\x1b[?1049h") < terminal.raw.rfind("\x1b[?1049l")
 
@@ -160,7 +160,7 @@ def test_nothing_starts_beside_a_robot_that_is_broken(
     shown = started.raw if isinstance(started, Terminal) else started.err
     (line,) = filter(None, map(str.strip, shown.splitlines()))
     assert line.startswith("holozen up: ") and "broken.urdf" in line
-    assert parts_at(wire) == {}
+    wait_for_none(wire)
 
 
 def test_nothing_starts_beside_robots_that_no_sim_takes(
@@ -175,7 +175,7 @@ def test_nothing_starts_beside_robots_that_no_sim_takes(
     ):
         words = [word for robot in robots for word in ("--robot", robot)]
         assert_one_line(verb(wire, "up", *words), 1, "holozen up: ", reason)
-    assert parts_at(wire) == {}
+    wait_for_none(wire)
 
 
 def test_a_wrong_flag_is_one_line_and_nothing_starts(wire: Wire, verb: Verb) -> None:
@@ -257,7 +257,7 @@ def test_a_part_that_dies_is_started_again_and_moves_no_robot_and_a_signal_ends_
     driven(robot)
     assert set(all_run(wire, PARTS)) == {"up", *PARTS}
     assert up.terminate(AT_MOST) == 0
-    assert parts_at(wire) == {}
+    wait_for_none(wire)
     robot.wait_for_stop_command()
     assert "Traceback" not in up.err
 

@@ -19,10 +19,11 @@ from holozen.transport.pubsub import Subscription
 from services.teleop import script
 from services.teleop.control.layouts import TTK
 from services.teleop.control.twist_mapper import Settings, TwistMapper
+from services.teleop.input.kitty import Event
 from services.teleop.script import Step
 from services.teleop.session import Session
 from services.teleop.toml_file import InputError
-from tests.core.teleop.paced import set_pace
+from tests.core.teleop import paced
 
 Run = Callable[..., tuple[int, str, str]]
 FORWARD, STRAFE, STOP, END = Twist.planar(0.5), Twist.planar(0, 0.5), Twist(), Twist.planar(-1.0)
@@ -78,7 +79,7 @@ def test_what_cannot_be_read_is_reported_in_one_line(tmp_path: Path) -> None:
 @pytest.fixture(autouse=True)
 def clock(monkeypatch: pytest.MonkeyPatch) -> None:
     """A script is given up that was paused for half a second, as by a busy machine."""
-    set_pace(monkeypatch)
+    paced.set_pace(monkeypatch)
 
 
 @pytest.fixture
@@ -155,6 +156,21 @@ def test_a_script_that_is_ended_releases_its_keys(
     assert script.run(parse("60s i"), session, stop) == "ended by a signal"
     session.halt()
     assert all_commands(session, commands)[-1] == STOP
+
+
+def test_a_pause_while_a_key_is_pressed_counts(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    take = Session.take
+
+    def suspended(session: Session, event: Event, now: float) -> str:
+        paced.now.sleep(script.DOUBT + 0.1)
+        return take(session, event, now)
+
+    monkeypatch.setattr(Session, "take", suspended)
+    expected = script.run(parse("60s i"), session, threading.Event())
+    assert expected == "it was paused, and the robot with it"
+    session.halt()
 
 
 def test_a_stopped_script_breaks_off(wire: Wire) -> None:
