@@ -28,9 +28,9 @@ def stop_event() -> threading.Event:
     threading.excepthook = _ThreadDeath(stop)
 
     def end(_number: int, _frame: FrameType | None) -> None:
-        give_up_readers()
         # Not set from here: the interrupted thread may be in `wait` and hold the event's lock.
         _thread.start_new_thread(stop.set, ())
+        give_up_readers()
 
     for number in SIGNALS:
         signal.signal(number, end)

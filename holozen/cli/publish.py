@@ -98,7 +98,7 @@ def _run(
         if payload is None:
             sending.send_all(_lines(form, args, stop))
         else:
-            sending.send_all(_turns(form, payload, args, stop, sending.pause))
+            sending.send_all(turns(form, payload, args, stop, sending.pause))
         if status_key and (args.once or args.times) and matched:
             has_status = bool(on_key(looking(), status_key, "pub"))
             sending.await_verdict(has_status, again=payload if args.once else None)
@@ -303,7 +303,7 @@ def _matched(
             reported = found
 
 
-def _turns(
+def turns(
     form: Form,
     payload: bytes,
     args: argparse.Namespace,
@@ -320,7 +320,7 @@ def _turns(
         if values.is_time_dependent(args.value):
             payload = _encoded(form, args)
         left = left and left - 1
-        due += period
+        due = max(due + period, time.monotonic())  # after a pause no burst makes up for it
         if not args.once:  # the last message also lasts one period
             pause(max(0.0, due - time.monotonic()))
 

@@ -83,22 +83,24 @@ def _step(words: list[str], where: str, layout: Layout) -> Step:
 def run(steps: list[Step], session: Session, stop: threading.Event) -> str:
     """Drive the steps in order. Returns why they were aborted, or ""."""
     patience = time.monotonic() + PATIENCE
-    while not session.listeners() and not stop.wait(TICK):
+    session.tick(time.monotonic())  # it finds a robot at the root by its name
+    while session.waiting or not session.listeners():
+        if stop.wait(TICK):
+            return "ended by a signal"
         now = time.monotonic()
         if now > patience:
-            return _nobody(session)
-        session.tick(now)  # it finds a robot at the root by its name
-    now = time.monotonic()
+            return session.waiting or _nobody(session)
+        session.tick(now)
+    drive = _Drive(session, stop)
     for step in steps:
         if not step.keys:
             session.let_go()
         for key in step.keys:
-            session.take(Key(key, key, "press", key), now)
-        why, now = _hold(session, now, step.seconds, stop)
-        if why:
+            session.take(Key(key, key, "press", key), drive.now)
+        if why := drive.hold(step.seconds):
             return why
         for key in step.keys:
-            session.take(Key(key, key, "release", key), now)
+            session.take(Key(key, key, "release", key), drive.now)
     return ""
 
 
@@ -116,31 +118,41 @@ def _nobody(session: Session) -> str:
     )
 
 
-def _hold(
-    session: Session, began: float, seconds: float, stop: threading.Event
-) -> tuple[str, float]:
-    """Drive for some seconds from a time on, that of the last look at the clock (s, monotonic): a
-    pause since then counts. Returns why that was aborted, or "", and the time of the last look.
+class _Drive:
+    """All steps of a script, and what was seen meanwhile; times in s, monotonic.
+
+    Attributes:
+        now: The last look at the clock; a pause since then counts, also between two steps.
     """
-    obeyed = now = began
-    heard = False
-    while now < began + seconds:
-        session.tick(now)
-        if stop.wait(min(TICK, began + seconds - now)):
-            return "ended by a signal", now
-        before, now = now, time.monotonic()
-        if now - before > DOUBT:
-            return "it was paused, and the robot with it", now
-        status = session.client.status()
-        why = _not_obeyed(session, status)
-        obeyed = obeyed if why else now
-        if session.warning or now - obeyed > DOUBT:
-            return session.warning or why, now
-        heard |= status.obeyed == session.bus.source or not any(session.mapper.motion)
-        if status.name and not heard and now - began > UNHEARD:
-            why = "the sim has received no command; does it hang? `holozen doctor` looks why"
-            return why, now
-    return "", now
+
+    def __init__(self, session: Session, stop: threading.Event) -> None:
+        self._session, self._stop = session, stop
+        self.now = self._obeyed = time.monotonic()
+        self._heard = False  # whether the sim has obeyed a command
+        self._unheard = 0.0  # s of commands until then
+
+    def hold(self, seconds: float) -> str:
+        """Drive for some seconds. Returns why that was aborted, or ""."""
+        session, until = self._session, self.now + seconds
+        while self.now < until:
+            session.tick(self.now)
+            if self._stop.wait(min(TICK, until - self.now)):
+                return "ended by a signal"
+            before, self.now = self.now, time.monotonic()
+            if self.now - before > DOUBT:
+                return "it was paused, and the robot with it"
+            status = session.client.status()
+            why = _not_obeyed(session, status)
+            if not why:
+                self._obeyed = self.now
+            if session.warning or self.now - self._obeyed > DOUBT:
+                return session.warning or why
+            self._heard |= status.obeyed == session.bus.source
+            if any(session.mapper.motion) and not self._heard:
+                self._unheard += self.now - before
+            if status.name and self._unheard > UNHEARD and not self._heard:
+                return "the sim has received no command; does it hang? `holozen doctor` looks why"
+        return ""
 
 
 def _not_obeyed(session: Session, status: CommandStatus) -> str:

@@ -5,11 +5,14 @@ import io
 import sys
 from argparse import Namespace
 from collections.abc import Callable
+from threading import Event
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import yaml
 
+from holozen.cli import publish
 from holozen.cli.form import Form
 from holozen.cli.values import LARGEST
 from holozen.messages import WIRES, CommandStatus, JointState, Message, Twist, TwistStamped, codec
@@ -160,3 +163,18 @@ def test_yaml_without_its_library_names_what_to_install(monkeypatch: pytest.Monk
     monkeypatch.setattr(builtins, "__import__", without_yaml)
     assert "pip install pyyaml" in refusal("linear: {x: 1}")
     assert read_message('{"linear": {"x": 1}}') == Twist.planar(1)
+
+
+def test_after_a_pause_no_burst_makes_up_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    now, pauses = 0.0, list[float]()
+
+    def pause(seconds: float) -> None:
+        nonlocal now
+        pauses.append(seconds)
+        now += seconds + 10.0 * (len(pauses) == 2)  # in the second it is suspended
+
+    monkeypatch.setattr(publish, "time", SimpleNamespace(monotonic=lambda: now))
+    args = Namespace(key="cmd_vel", rate=10.0, once=False, times=5, value="{}")
+    sent = list(publish.turns(form("cmd_vel"), b"{}", args, Event(), pause))
+    assert sent == [b"{}"] * 5
+    assert pauses == pytest.approx([0.1, 0.1, 0.0, 0.1, 0.1])

@@ -190,6 +190,14 @@ def test_a_stopped_script_breaks_off(wire: Wire) -> None:
     )
 
 
+def test_short_steps_that_nobody_obeys_add_up(session: Session, wire: Wire) -> None:
+    status = wire.bus("sim").publisher("simulation_status", SimulationStatus)
+    with repeated(lambda: status.put(SimulationStatus(SimulationState.STATE_PAUSED))):
+        wait_for(lambda: session.client.odom.is_paused)
+        expected = script.run(parse("200ms i\n" * 300), session, threading.Event())
+    assert expected == "the sim is paused; `holozen sim play` continues it"
+
+
 def test_a_script_breaks_off_in_a_paused_sim(session: Session, wire: Wire) -> None:
     status = wire.bus("sim").publisher("simulation_status", SimulationStatus)
     with repeated(lambda: status.put(SimulationStatus(SimulationState.STATE_PAUSED))):
