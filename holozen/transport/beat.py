@@ -261,7 +261,8 @@ class Echoes(Declared):
         self._vouched: dict[str, int] = {}  # what was echoed last by `vouched`
         self.was_heard = False  # whether any was heard when the last command was sent
         self._turn = 0  # of `hearing`, when it was last looked at
-        self._is_settled = self._has_waited = False  # the latter: for who subscribes, not beats
+        self._is_settled = False
+        self._has_waited = False  # as long as it may, for who subscribes and is not known to beat
         self._waits_since: float | None = None  # s, monotonic; None: it does not wait
         self._has_reported = False
 
@@ -333,9 +334,12 @@ class Echoes(Declared):
         deadline = time.monotonic() + timeout
         if not self.heard and timeout:
             self._hearing.roll_call(timeout)
-        while timeout and not self._has_waited and not self.has_receiver and self._matched():
-            self._has_waited = time.monotonic() >= deadline
-            time.sleep(LOOK)
+        if timeout and not self._has_waited:
+            while not self.has_receiver and self._matched():
+                if time.monotonic() >= deadline:
+                    self._has_waited = True
+                    break
+                time.sleep(LOOK)
         while self.awaited and time.monotonic() < deadline:
             time.sleep(LOOK)
 

@@ -4,7 +4,6 @@ server.
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -30,7 +29,7 @@ from holozen.transport.node import Node, checked_wire
 from holozen.transport.pubsub import Gets, Latest, Publisher, RawPublisher, Subscription
 from holozen.transport.samples import PRIORITIES, Dealer, Numbers, RawSubscriber, Ring, stamps
 from holozen.transport.services import RING, ROOM, Server
-from holozen.transport.session import one_line, tokens
+from holozen.transport.session import is_matched, one_line, tokens
 
 if TYPE_CHECKING:
     from holozen.messages import Message
@@ -200,7 +199,7 @@ class Bus(Node):
             )
         watch = partial(publisher.declare_matching_listener, zenoh.handlers.RingChannel(1))
         sign = partial(self.member.attachment, key, priority) if self.member and commands else None
-        echoes = self.echoes(key, partial(_is_matched, publisher)) if commands else None
+        echoes = self.echoes(key, partial(is_matched, publisher)) if commands else None
         writer = make(publisher, self.stamps(key), watch, sign, echoes)
         self._answer_gets(writer, key)
         if commands and dead_man:
@@ -372,13 +371,6 @@ class Bus(Node):
         """
         _check_call(key, request, reply, timeout)
         return services.call(self, key, request, reply, timeout, everyone=True)
-
-
-def _is_matched(publisher: Any) -> bool:
-    """Whether anyone subscribes to what a publisher of Zenoh's sends."""
-    with contextlib.suppress(zenoh.ZError):  # it was closed by another thread
-        return bool(publisher.matching_status.matching)
-    return False
 
 
 def _of_all(key: str) -> str:

@@ -397,6 +397,13 @@ def linked(session: Any) -> bool:
     return bool(session.info.peers_zid() or session.info.routers_zid())
 
 
+def is_matched(publisher: Any) -> bool:
+    """Whether anyone subscribes to what a publisher of Zenoh's sends."""
+    with contextlib.suppress(zenoh.ZError):  # it was closed by another thread
+        return bool(publisher.matching_status.matching)
+    return False
+
+
 def configuration(connection: Connection) -> zenoh.Config:
     """Zenoh's configuration for a connection. Raises BusError."""
     with one_line(f"Zenoh configuration {connection.config}"):

@@ -18,7 +18,7 @@ from holozen.testing.wire import command
 from holozen.transport.errors import ServiceError
 
 from .conftest import Verb, start_sim
-from .processes import assert_one_line, parts_at, state_of, wait_for_none
+from .processes import assert_one_line, parts_at, state_of, wait_for_none, words_of
 from .robots import Robot, moves, rests
 
 BOT = str(data.find("urdf", "hb_bot.urdf.xacro"))
@@ -33,6 +33,12 @@ def all_run(wire: Wire, parts: set[str]) -> dict[str, int]:
     return wait_for(lambda: found if parts <= set(found := parts_at(wire)) else {}, 20)
 
 
+def assert_ended(parts: dict[str, int], wire: Wire) -> None:
+    """These parts are gone; a helper that a sim has forked ends a moment after it."""
+    assert not any(map(words_of, parts.values()))
+    wait_for_none(wire)
+
+
 def driven(robot: Robot) -> None:
     robot.odom.next(lambda odom: not rests(odom))
 
@@ -43,12 +49,13 @@ def test_without_a_terminal_the_controller_drives_the_square_and_the_page_of_a_v
     up = wire.start("up", "--rtf", "4", "--size", "0.5", "--laps", "1", "--view", "0")
     up.wait_for_line("up: no terminal here, so no teleop; the rest runs until Ctrl-C or SIGTERM")
     up.wait_for_line("lap 1 goal 3: (0.00, 0.00, 0 deg)", within=40)
-    assert set(parts_at(wire)) >= {"up", "sim", "pose-service"}
+    parts = parts_at(wire)
+    assert set(parts) >= {"up", "sim", "pose-service"}
     address = up.wait_for_line("http://127.0.0.1:").split()[-1]
     with urllib.request.urlopen(address) as page:
         assert b"holozen" in page.read()
     assert up.terminate(AT_MOST) == 0
-    wait_for_none(wire)
+    assert_ended(parts, wire)
     with pytest.raises(urllib.error.URLError):
         urllib.request.urlopen(address)
     assert "Traceback" not in up.err
@@ -88,12 +95,13 @@ def test_a_signal_right_at_the_start_leaves_nothing(wire: Wire) -> None:
 
 def test_a_part_that_hangs_is_killed_and_reported(wire: Wire) -> None:
     up = wire.start("up")
-    sim = all_run(wire, PARTS)["sim"]
+    parts = all_run(wire, PARTS)
+    sim = parts["sim"]
     os.kill(sim, signal.SIGSTOP)
     # of two signals that wait, the kernel delivers SIGTERM first
     wait_for(lambda: state_of(sim) == "T")
     assert up.interrupt(AT_MOST) == 0
-    wait_for_none(wire)
+    assert_ended(parts, wire)
     assert "up: sim did not end within 0.5 s and was killed" in up.err
 
 
@@ -101,7 +109,7 @@ def test_in_a_terminal_it_shows_the_teleop_and_ctrl_c_ends_all(wire: Wire) -> No
     terminal = wire.terminal("up")
     robot = Robot(wire.bus())
     terminal.wait_for_text("controller@")
-    all_run(wire, {"teleop", *PARTS})
+    parts = all_run(wire, {"teleop", *PARTS})
 
     def teleop_drives() -> bool:
         """And the controller has been silent for a while: it has yielded, and written so."""
@@ -112,7 +120,7 @@ def test_in_a_terminal_it_shows_the_teleop_and_ctrl_c_ends_all(wire: Wire) -> No
     terminal.hold_until(",", teleop_drives)
     terminal.type("\x03")
     assert terminal.process.wait(AT_MOST) == 0
-    wait_for_none(wire)
+    assert_ended(parts, wire)
     robot.wait_for_stop_command()
     assert terminal.modes() == terminal.modes_before
     assert "controller: yields to teleop@" in terminal.screen(), (
@@ -135,9 +143,10 @@ def test_a_terminal_that_is_closed_ends_all_with_a_stop_of_the_robot(wire: Wire)
 def test_a_killed_teleop_ends_all_and_leaves_the_terminal_tidy(wire: Wire) -> None:
     terminal = wire.terminal("up")
     terminal.wait_for_text("controller@")
-    os.kill(parts_at(wire)["teleop"], signal.SIGKILL)
+    parts = parts_at(wire)
+    os.kill(parts["teleop"], signal.SIGKILL)
     terminal.process.wait()
-    wait_for_none(wire)
+    assert_ended(parts, wire)
     assert terminal.modes() == terminal.modes_before
     assert terminal.raw.rfind("\x1b[?1049h") < terminal.raw.rfind("\x1b[?1049l")
 
@@ -160,7 +169,7 @@ def test_nothing_starts_beside_a_robot_that_is_broken(
     shown = started.raw if isinstance(started, Terminal) else started.err
     (line,) = filter(None, map(str.strip, shown.splitlines()))
     assert line.startswith("holozen up: ") and "broken.urdf" in line
-    wait_for_none(wire)
+    assert parts_at(wire) == {}
 
 
 def test_nothing_starts_beside_robots_that_no_sim_takes(
@@ -175,7 +184,7 @@ def test_nothing_starts_beside_robots_that_no_sim_takes(
     ):
         words = [word for robot in robots for word in ("--robot", robot)]
         assert_one_line(verb(wire, "up", *words), 1, "holozen up: ", reason)
-    wait_for_none(wire)
+    assert parts_at(wire) == {}
 
 
 def test_a_wrong_flag_is_one_line_and_nothing_starts(wire: Wire, verb: Verb) -> None:
@@ -255,9 +264,10 @@ def test_a_part_that_dies_is_started_again_and_moves_no_robot_and_a_signal_ends_
             assert wire.run("release").returncode == 0
         wait_for(partial(resumed, robot))
     driven(robot)
-    assert set(all_run(wire, PARTS)) == {"up", *PARTS}
+    parts = all_run(wire, PARTS)
+    assert set(parts) == {"up", *PARTS}
     assert up.terminate(AT_MOST) == 0
-    wait_for_none(wire)
+    assert_ended(parts, wire)
     robot.wait_for_stop_command()
     assert "Traceback" not in up.err
 

@@ -15,6 +15,7 @@ from holozen.ros.gateway import rmw_zenoh as rmw
 from holozen.ros.gateway.sides import MANY, NODES, Ends, Sides, quietly
 from holozen.transport import graph as graphs
 from holozen.transport.samples import Numbers, Sample, stamps
+from holozen.transport.session import is_matched
 
 JITTER = 0.1  # s; the time under way that counts as none: what several nodes send stays in order
 UNDER_WAY = f"a command was under way for more than {wire.MAX_COMMAND_AGE:g} s"
@@ -138,10 +139,7 @@ class TopicRoutes:
         ages = _AgesOfWriters(
             lambda gid: stamps(self._source(theirs, gid), self._sides.bus.id, numbers)
         )
-
-        def matched() -> bool:
-            return bool(publisher.matching_status.matching)
-
+        matched = partial(is_matched, publisher)
         echoes = self._sides.bus.echoes(key, matched) if is_command else None
         if echoes:
             echoes.settle()
